@@ -32,9 +32,11 @@ target_compile_options(fathom_warnings INTERFACE
     -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Werror
     # g++ 12 reports std::string operator+ falsely (GCC bug 105651).
     $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>
-    # g++ does not follow definitions through sanitizer instrumentation.
-    $<$<BOOL:${FATHOM_SANITIZE}>:-Wno-maybe-uninitialized>
     $<$<CXX_COMPILER_ID:Clang>:-Wthread-safety>)
+if(FATHOM_SANITIZE)
+  # g++ does not follow definitions through sanitizer instrumentation.
+  target_compile_options(fathom_warnings INTERFACE -Wno-maybe-uninitialized)
+endif()
 
 # fathom_add_library(<name> SOURCES <file>... [PUBLIC <lib>...]
 #                    [PRIVATE <lib>...])

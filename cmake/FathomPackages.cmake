@@ -45,3 +45,7 @@ if(BUILD_TESTING OR NOT DEFINED BUILD_TESTING)
   find_package(GTest CONFIG REQUIRED)
   find_package(benchmark CONFIG REQUIRED)
 endif()
+
+# Test tools in Python use Debian's interpreter: python3-grpcio and
+# python3-protobuf belong to it, not to whatever python3 is first in PATH.
+find_program(FATHOM_PYTHON python3 PATHS /usr/bin NO_DEFAULT_PATH REQUIRED)
