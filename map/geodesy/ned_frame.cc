@@ -1,0 +1,103 @@
+#include "map/geodesy/ned_frame.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace fathom::map {
+namespace {
+
+constexpr double kRadPerDeg = std::numbers::pi / 180.0;
+
+// WGS84 (NIMA TR8350.2): equatorial radius, first eccentricity squared.
+constexpr double kEquatorialM = 6378137.0;
+constexpr double kFlattening = 1.0 / 298.257223563;
+constexpr double kEccentricity2 = kFlattening * (2.0 - kFlattening);
+
+// Longitude of `point` east of `origin`, in [-pi, pi]. Subtracting before
+// turning to radians keeps all digits of small differences.
+double EastOfRad(const GeodeticPoint& origin, const GeodeticPoint& point) {
+  double delta_deg = point.longitude_deg - origin.longitude_deg;
+  if (delta_deg > 180.0 || delta_deg < -180.0) {
+    delta_deg = NormalizeLongitudeDeg(delta_deg);
+  }
+  return delta_deg * kRadPerDeg;
+}
+
+}  // namespace
+
+NedFrame::NedFrame(const GeodeticPoint& origin)
+    : origin_(origin),
+      sin_lat_(std::sin(origin.latitude_deg * kRadPerDeg)),
+      cos_lat_(std::cos(origin.latitude_deg * kRadPerDeg)) {
+  // N: radius of curvature in the prime vertical.
+  const double normal_m =
+      kEquatorialM / std::sqrt(1.0 - kEccentricity2 * sin_lat_ * sin_lat_);
+  axis_m_ = normal_m * cos_lat_;
+  height_m_ = normal_m * (1.0 - kEccentricity2) * sin_lat_;
+}
+
+NedPoint NedFrame::ToNed(const GeodeticPoint& point) const {
+  // Earth-fixed axes turned about the pole so that the origin has longitude
+  // 0: a towards the origin's meridian, b east, c north pole.
+  const double lat_rad = point.latitude_deg * kRadPerDeg;
+  const double east_rad = EastOfRad(origin_, point);
+  const double sin_lat = std::sin(lat_rad);
+  const double cos_lat = std::cos(lat_rad);
+  const double normal_m =
+      kEquatorialM / std::sqrt(1.0 - kEccentricity2 * sin_lat * sin_lat);
+  const double a_m = normal_m * cos_lat * std::cos(east_rad);
+  const double b_m = normal_m * cos_lat * std::sin(east_rad);
+  const double c_m = normal_m * (1.0 - kEccentricity2) * sin_lat;
+  return {.north_m = cos_lat_ * (c_m - height_m_) - sin_lat_ * (a_m - axis_m_),
+          .east_m = b_m,
+          .down_m = 0.0};
+}
+
+GeodeticPoint NedFrame::ToGeodetic(double north_m, double east_m) const {
+  // The line through (north, east) along the origin's vertical meets the
+  // ellipsoid (a^2 + b^2) + c^2 / (1 - e^2) = R^2 at depth d below the plane:
+  // a quadratic A d^2 - 2 B d + C = 0 of which the root near 0 is wanted.
+  const double flat = 1.0 / (1.0 - kEccentricity2);
+  const double a0 = axis_m_ - sin_lat_ * north_m;
+  const double c0 = height_m_ + cos_lat_ * north_m;
+  const double qa = cos_lat_ * cos_lat_ + flat * sin_lat_ * sin_lat_;
+  const double qb = a0 * cos_lat_ + flat * c0 * sin_lat_;
+  // C with the origin's own terms (they cancel to 0) left out: no digits lost.
+  const double qc =
+      north_m * north_m * (sin_lat_ * sin_lat_ + flat * cos_lat_ * cos_lat_) +
+      2.0 * north_m * (flat * height_m_ * cos_lat_ - axis_m_ * sin_lat_) +
+      east_m * east_m;
+  const double root = std::sqrt(std::max(0.0, qb * qb - qa * qc));
+  const double down_m = qc / (qb + root);
+  const double a_m = a0 - cos_lat_ * down_m;
+  const double c_m = c0 - sin_lat_ * down_m;
+  const double lat_rad =
+      std::atan2(c_m, (1.0 - kEccentricity2) * std::hypot(a_m, east_m));
+  const double east_rad = std::atan2(east_m, a_m);
+  return {.latitude_deg = lat_rad / kRadPerDeg,
+          .longitude_deg = NormalizeLongitudeDeg(origin_.longitude_deg +
+                                                 east_rad / kRadPerDeg)};
+}
+
+double NedFrame::NorthAzimuthRad(const GeodeticPoint& point) const {
+  const double lat_rad = point.latitude_deg * kRadPerDeg;
+  const double east_rad = EastOfRad(origin_, point);
+  // The unit vector that points north at `point`, in this frame's axes.
+  const double east = -std::sin(lat_rad) * std::sin(east_rad);
+  const double north = sin_lat_ * std::sin(lat_rad) * std::cos(east_rad) +
+                       cos_lat_ * std::cos(lat_rad);
+  return std::atan2(east, north);
+}
+
+NedPoint SphericalNorthEast(const GeodeticPoint& reference,
+                            const GeodeticPoint& point) {
+  return {.north_m = (point.latitude_deg - reference.latitude_deg) *
+                     kRadPerDeg * kEquatorialM,
+          .east_m = (point.longitude_deg - reference.longitude_deg) *
+                    kRadPerDeg * kEquatorialM *
+                    std::cos(reference.latitude_deg * kRadPerDeg),
+          .down_m = 0.0};
+}
+
+}  // namespace fathom::map
