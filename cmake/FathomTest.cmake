@@ -18,6 +18,26 @@ foreach(label IN LISTS fathom_test_labels)
   add_custom_target(fathom_tests_${label})
 endforeach()
 
+# Gives `source` the absolute paths that it names, as string literals.
+function(fathom_define_paths source)
+  get_filename_component(path ${source} ABSOLUTE)
+  if(NOT EXISTS ${path})
+    return()  # Generated later: no paths.
+  endif()
+  # Configure again when the source changes, since it may name another path.
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${path})
+  set(FATHOM_SOURCE_DIR ${PROJECT_SOURCE_DIR})
+  set(FATHOM_BINARY_DIR ${PROJECT_BINARY_DIR})
+  foreach(name IN ITEMS
+      FATHOM_SHARED_DATA_DIR FATHOM_SOURCE_DIR FATHOM_BINARY_DIR)
+    file(STRINGS ${path} found REGEX ${name} LIMIT_COUNT 1)
+    if(found)
+      set_property(SOURCE ${source} APPEND PROPERTY
+          COMPILE_DEFINITIONS "${name}=\"${${name}}\"")
+    endif()
+  endforeach()
+endfunction()
+
 # fathom_add_test(NAME <name> SOURCES <file>... [LIBS <lib>...]
 #                 [LABELS <label>...] [TIMEOUT <seconds>]
 #                 [NO_MAIN])
@@ -26,8 +46,9 @@ endforeach()
 # TEST costs more than the tests). Labels: quick, integration, tsan, slow,
 # fault, fuzz. A test is `quick` unless it is integration, slow, fault or
 # fuzz; `tsan` marks gRPC-free concurrent classes and is added to quick.
-# The binary sees FATHOM_SHARED_DATA_DIR and FATHOM_SOURCE_DIR as string
-# literals. TIMEOUT defaults to 120 s, doubled under a sanitizer.
+# A source that names FATHOM_SHARED_DATA_DIR, FATHOM_SOURCE_DIR or
+# FATHOM_BINARY_DIR sees it as a string literal; other sources do not, so that
+# their objects are the same in every clone and ccache serves them. TIMEOUT defaults to 120 s, doubled under a sanitizer.
 # NO_MAIN leaves main() to the sources.
 function(fathom_add_test)
   cmake_parse_arguments(PARSE_ARGV 0 ARG
@@ -61,9 +82,9 @@ function(fathom_add_test)
   if(NOT ARG_NO_MAIN)
     target_link_libraries(${ARG_NAME} PRIVATE GTest::gtest_main)
   endif()
-  target_compile_definitions(${ARG_NAME} PRIVATE
-      FATHOM_SHARED_DATA_DIR="${FATHOM_SHARED_DATA_DIR}"
-      FATHOM_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  foreach(source IN LISTS ARG_SOURCES)
+    fathom_define_paths(${source})
+  endforeach()
   add_test(NAME ${ARG_NAME} COMMAND ${ARG_NAME} --gtest_brief=1)
   set_tests_properties(${ARG_NAME} PROPERTIES
       LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT})
