@@ -1,0 +1,106 @@
+// ContactMap: the dynamic obstacle map, a bounded list of moving obstacles
+// (Nervegna 2002, chapter 5; algorithm UPDATE-DYNAMIC-MAP, fig. 5-4, whose
+// "else" of lines 16 and 40 belongs to the C4I test).
+//
+// One thread writes; readers use View(). Deterministic: the same reports in
+// the same order give the same contacts, bit for bit, and so does Restore
+// followed by the rest of the reports. No clock: time is the reports'.
+
+#ifndef FATHOM_MAP_CONTACTS_CONTACT_MAP_H_
+#define FATHOM_MAP_CONTACTS_CONTACT_MAP_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "base/time.h"
+#include "map/contacts/contact.h"
+#include "map/contacts/contact_class.h"
+#include "map/contacts/contact_report.h"
+#include "map/contacts/contacts_view.h"
+#include "map/contacts/filter.h"
+#include "map/geodesy/ids.h"
+#include "map/geodesy/ping.h"
+
+namespace fathom::map {
+
+struct ContactMapOptions {
+  // Most contacts that are not dropped; one more is refused (section 5.5). As
+  // many dropped ones are remembered; beyond, the longest gone is forgotten
+  // (the mission file still has it). 1 to 100 000.
+  std::uint32_t max_contacts = 1000;
+  FilterKind filter = FilterKind::kFourState;
+  ContactClassTable classes = DefaultContactClasses();
+};
+
+// What became of a report.
+struct ContactOutcome {
+  // Fused (or the track was closed).
+  bool applied = false;
+  // Why not; absent when applied, and when a contact to drop is not held.
+  std::optional<RejectReason> reason;
+  // The contact's newest estimate after the call, if it is held: for the
+  // history. Unchanged if not applied.
+  std::optional<ContactEstimate> estimate;
+};
+
+class ContactMap {
+ public:
+  // REQUIRES: options in the ranges stated (ValidateContactClasses).
+  explicit ContactMap(ContactMapOptions options);
+  ContactMap(ContactMap&&) noexcept;
+  ContactMap& operator=(ContactMap&&) noexcept;
+  ~ContactMap();
+
+  // Fuses one report, or refuses it and changes nothing:
+  //   as CheckContactReport says,
+  //   kTooLate       older than the contact's newest estimate,
+  //   kContactsFull  a new contact and no room.
+  // A fix overwrites position, velocity and covariance (its stds not below
+  // 0.01 m and 0.001 m/s, so that the covariance stays positive). An inactive
+  // report about a contact that is not held or gone already is applied and
+  // changes nothing. About 1 us.
+  ContactOutcome Apply(const ContactReport& report);
+
+  // Closes a track at `time` (or at its newest estimate, if that is later).
+  // Not applied: the contact is not held or was dropped before.
+  ContactOutcome Drop(const ContactKey& key, Time time);
+
+  // The contacts as they are. Free if nothing changed since the last call;
+  // else O(size / 64).
+  ContactsView View();
+
+  // Puts a stored contact back. Errors: ALREADY_EXISTS (its key is held),
+  // INVALID_ARGUMENT (no estimates, not in order of time, not finite, keys
+  // that differ), RESOURCE_EXHAUSTED (beyond max_contacts live ones).
+  absl::Status Restore(StoredContact stored);
+
+  // Contacts held and not dropped.
+  std::size_t live_count() const { return live_count_; }
+  const ContactMapOptions& options() const { return *options_; }
+
+ private:
+  // The point that follows from `report`, on top of `held` (nullptr: first).
+  ContactPoint Fuse(const ContactReport& report,
+                    const ContactPoint* held) const;
+  // Appends to the contact, adding it if needed, and keeps the counts.
+  ContactOutcome Append(const ContactKey& key, const ContactPoint& point);
+  void ForgetLongestGone();
+
+  std::shared_ptr<const ContactMapOptions> options_;
+  // Shared with the last view until the next change.
+  std::shared_ptr<ContactSet> set_;
+  // Grows with each View(): pieces of this epoch are not yet shared.
+  std::uint64_t epoch_ = 1;
+  std::size_t live_count_ = 0;
+  // Dropped contacts by the time of their drop.
+  std::set<std::pair<Time, ContactKey>> gone_;
+};
+
+}  // namespace fathom::map
+
+#endif  // FATHOM_MAP_CONTACTS_CONTACT_MAP_H_
