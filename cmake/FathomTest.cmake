@@ -2,13 +2,7 @@
 
 # Where real survey and contact recordings are. The folder lies beside the
 # project root and is optional: a test that needs it prints why it skips.
-set(fathom_shared_data_default ${PROJECT_SOURCE_DIR}/../shared/data)
-if(NOT EXISTS ${fathom_shared_data_default} AND
-    EXISTS ${PROJECT_SOURCE_DIR}/../../shared/data)
-  # A git worktree that lies one level deeper than the main checkout.
-  set(fathom_shared_data_default ${PROJECT_SOURCE_DIR}/../../shared/data)
-endif()
-set(FATHOM_SHARED_DATA_DIR ${fathom_shared_data_default} CACHE PATH
+set(FATHOM_SHARED_DATA_DIR ${PROJECT_SOURCE_DIR}/../shared/data CACHE PATH
     "Folder of shared survey recordings; may be absent")
 
 # Build every test with one of these labels: fathom_tests_quick,
