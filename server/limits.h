@@ -1,0 +1,157 @@
+// Every bound of the server, each with its reason. All that a client can meet
+// are published in GetMissionStatus; each has a test at the limit and one past
+// it. At a bound the server refuses clearly (RESOURCE_EXHAUSTED, what and how
+// much) and keeps serving.
+//
+// Constants only; nothing here is changed at run time.
+
+#ifndef FATHOM_SERVER_LIMITS_H_
+#define FATHOM_SERVER_LIMITS_H_
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+
+namespace fathom::server {
+
+// ---- Messages ----
+
+// Largest request message, bytes. 100 000 points with time offsets are about
+// 3.0 MB, a 512 x 512 chart tile with stds 2.4 MB; 8 MiB holds both twice.
+inline constexpr int kMaxMessageBytes = 8 * 1024 * 1024;
+
+// Most measurements in one ping. The SeaBat 8101 of the thesis has 101 beams;
+// multibeams of today have 1024; 4096 leaves room and keeps a ping at 64 kB.
+inline constexpr size_t kMaxBeamsPerPing = 4096;
+
+// Most points in QueryObstacles: at 5-20 M points/s one request keeps a
+// thread busy for 20 ms at most.
+inline constexpr size_t kMaxPointsPerQuery = 100'000;
+
+// Most waypoints in CheckTrajectory: a day's plan at one a ten seconds.
+inline constexpr size_t kMaxWaypoints = 10'000;
+
+// Most reports in ReportContacts: an AIS receiver hears a few hundred ships a
+// minute; 1000 reports are one group commit.
+inline constexpr size_t kMaxReportsPerRequest = 1000;
+
+// Most cells in one DepthTile, 512 x 512: 2 MB with stds, below
+// kMaxMessageBytes, and a few tens of milliseconds of the writer.
+inline constexpr size_t kMaxTileCells = 512 * 512;
+
+// Most chart cells in one import: a 16 000 x 16 000 raster. The map itself is
+// bounded by max_cells; this bounds the time a stream may take.
+inline constexpr uint64_t kMaxImportCells = 256'000'000;
+
+// Most cells in a GetRegion answer: 4096 x 4096, 270 MB on the wire.
+inline constexpr uint64_t kMaxRegionCells = 16'777'216;
+
+// Side of a GetRegion tile: 256 x 256 x 17 B = 1.1 MB, below the 4 MB that
+// foreign gRPC clients accept by default.
+inline constexpr uint32_t kRegionTileSide = 256;
+
+// Estimates in one GetContactHistoryResponse (the contract says 1000).
+inline constexpr size_t kHistoryEstimatesPerMessage = 1000;
+
+// Most estimates in one GetContactHistory: a day at one a second; past it the
+// client narrows the time range.
+inline constexpr size_t kMaxHistoryEstimates = 100'000;
+
+// Contacts named in one point's answer, and the least probability of one.
+inline constexpr size_t kMaxContactsPerAnswer = 16;
+inline constexpr double kMinContactProbability = 1e-6;
+
+// Activities listed in GetMissionStatus.
+inline constexpr size_t kMaxActivitiesListed = 1000;
+
+// Rejections and gaps listed in one ack; beyond, only the counters tell.
+inline constexpr int kMaxRejectionsPerAck = 100;
+inline constexpr int kMaxGapsPerAck = 100;
+
+// ---- Text ----
+
+// Ids of sources, activities, vehicles and contacts.
+inline constexpr size_t kMaxIdLength = 64;
+// Names of missions, charts and datums.
+inline constexpr size_t kMaxNameLength = 200;
+
+// ---- Numbers ----
+
+// Depths, metres below datum: above the highest building that a chart could
+// mean and below the Challenger Deep (10 935 m).
+inline constexpr double kMinDepthM = -100;
+inline constexpr double kMaxDepthM = 12'000;
+// Height of the water surface above datum: beyond any tide and surge.
+inline constexpr double kMaxWaterLevelM = 50;
+// Position std: worse than this a ping places nothing.
+inline constexpr double kMaxPositionStdM = 100'000;
+// Horizontal range of an on-board sensor (radar, passive sonar).
+inline constexpr double kMaxContactRangeM = 200'000;
+// Speed of a contact, m/s: no vessel exceeds it.
+inline constexpr double kMaxContactSpeedMS = 60;
+inline constexpr double kMaxVelocityStdMS = 100;
+inline constexpr double kMaxBearingStdDeg = 60;
+// Std of a depth. The leaf's code ends at 1000 m.
+inline constexpr double kMaxDepthStdM = 1000;
+// Clearance and radius of a query.
+inline constexpr double kMaxClearanceM = 12'000;
+inline constexpr double kMaxRadiusM = 50'000;
+// Side of a local cell and of an area.
+inline constexpr double kMinCellSizeM = 0.1;
+inline constexpr double kMaxCellSizeM = 1000;
+inline constexpr double kMaxAreaExtentM = 100'000;
+// Ranges of a forward-looking sonar, and the one that stands for 0.
+inline constexpr double kMaxSonarRangeM = 100'000;
+inline constexpr double kDefaultMaxRangeM = 1000;
+// Smoothing reaches at most so far; cells within d are touched per beam.
+inline constexpr double kMaxSmoothingDistanceM = 1000;
+// Finest answer cell of GetRegion.
+inline constexpr double kMinResolutionM = 0.1;
+// Step of a chart's grid, degrees.
+inline constexpr double kMaxStepDeg = 10;
+// How far before and behind the base time a point of a batch may lie: 10
+// years keeps every sum far inside int64.
+inline constexpr int64_t kMaxTimeOffsetUs = 315'360'000'000'000;
+
+// ---- Queues, threads, times ----
+
+// Ingest messages that wait for the writer or the disk. At 200 k pings/s it
+// is 20 ms, one group commit.
+inline constexpr size_t kMaxPendingIngest = 4096;
+// The same in bytes, for large pings: 32 MiB.
+inline constexpr size_t kMaxPendingIngestBytes = 32 * 1024 * 1024;
+// Commands (start, transfer, import tile, ...) that wait. Each holds at most
+// one chart tile: 2 MB.
+inline constexpr size_t kMaxPendingCommands = 64;
+// Messages that the writer applies before it publishes a view.
+inline constexpr size_t kMaxMessagesPerView = 256;
+
+// Concurrent ingest streams: one a vehicle or feeder; each holds at most one
+// message in hand.
+inline constexpr int kMaxIngestStreams = 64;
+// Concurrent imports.
+inline constexpr int kMaxImports = 4;
+// Concurrent watchers (issue of the watch RPCs).
+inline constexpr int kMaxWatchers = 256;
+// Queries that wait for a min_revision.
+inline constexpr size_t kMaxRevisionWaiters = 1024;
+// Longest wait for a min_revision when the client sets no deadline.
+inline constexpr std::chrono::milliseconds kMaxRevisionWait{10'000};
+// How long before the client's deadline such a wait gives up, so that
+// UNAVAILABLE still reaches it.
+inline constexpr std::chrono::milliseconds kRevisionWaitMargin{20};
+
+// What RetryInfo suggests when ingest is refused.
+inline constexpr std::chrono::milliseconds kRetryDelay{1000};
+// How long SIGTERM waits for calls to end before it cuts them.
+inline constexpr std::chrono::milliseconds kDrainTime{10'000};
+
+// Journal records after which the writer makes a snapshot. Replay runs near
+// 100 k records/s, so a start after kill -9 takes 0.2 s more at most.
+inline constexpr size_t kJournalMaxRecords = 20'000;
+// How long the storage thread waits before it tries again after a fault.
+inline constexpr std::chrono::milliseconds kStorageRetryDelay{250};
+
+}  // namespace fathom::server
+
+#endif  // FATHOM_SERVER_LIMITS_H_
