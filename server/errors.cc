@@ -55,8 +55,8 @@ void AttachRetry(absl::Status& status) {
   google::rpc::RetryInfo retry;
   const int64_t delay_ms = kRetryDelay.count();
   retry.mutable_retry_delay()->set_seconds(delay_ms / 1000);
-  retry.mutable_retry_delay()->set_nanos(
-      static_cast<int32_t>(delay_ms % 1000) * 1'000'000);
+  retry.mutable_retry_delay()->set_nanos(static_cast<int32_t>(delay_ms % 1000) *
+                                         1'000'000);
   Attach(status, retry);
 }
 
@@ -64,8 +64,8 @@ void AttachRetry(absl::Status& status) {
 
 absl::Status InvalidField(std::string_view path, std::string_view description,
                           v1::RejectReason reason) {
-  absl::Status status = absl::InvalidArgumentError(
-      absl::StrFormat("%s: %s", path, description));
+  absl::Status status =
+      absl::InvalidArgumentError(absl::StrFormat("%s: %s", path, description));
   google::rpc::BadRequest bad_request;
   auto* violation = bad_request.add_field_violations();
   violation->set_field(std::string(path));
@@ -79,9 +79,9 @@ absl::Status InvalidField(std::string_view path, std::string_view description,
 
 absl::Status LimitExceeded(std::string_view path, uint64_t count,
                            uint64_t limit) {
-  absl::Status status = absl::ResourceExhaustedError(absl::StrFormat(
-      "%s: %d is more than the limit of %d; split the request", path, count,
-      limit));
+  absl::Status status = absl::ResourceExhaustedError(
+      absl::StrFormat("%s: %d is more than the limit of %d; split the request",
+                      path, count, limit));
   AttachReason(status, "LIMIT_EXCEEDED",
                {{"field", std::string(path)},
                 {"count", absl::StrCat(count)},
@@ -165,8 +165,7 @@ absl::Status NotYet(std::string_view rpc) {
 
 std::optional<FieldViolation> ViolationOf(const absl::Status& status) {
   const auto bad_request = DetailOf<google::rpc::BadRequest>(status);
-  if (!bad_request.has_value() ||
-      bad_request->field_violations_size() == 0) {
+  if (!bad_request.has_value() || bad_request->field_violations_size() == 0) {
     return std::nullopt;
   }
   FieldViolation violation{
@@ -195,10 +194,9 @@ grpc::Status ToGrpc(const absl::Status& status) {
         any->set_type_url(std::string(type_url));
         any->set_value(std::string(payload));
       });
-  return grpc::Status(static_cast<grpc::StatusCode>(status.raw_code()),
-                      rich.message(),
-                      rich.details_size() == 0 ? std::string()
-                                               : rich.SerializeAsString());
+  return grpc::Status(
+      static_cast<grpc::StatusCode>(status.raw_code()), rich.message(),
+      rich.details_size() == 0 ? std::string() : rich.SerializeAsString());
 }
 
 }  // namespace fathom::server

@@ -73,8 +73,8 @@ absl::Status CheckName(std::string_view name, const FieldPath& path) {
   if (name.size() > kMaxNameLength) {
     return InvalidField(
         path.ToString(),
-        absl::StrFormat("is %d bytes long, at most %d are allowed",
-                        name.size(), kMaxNameLength));
+        absl::StrFormat("is %d bytes long, at most %d are allowed", name.size(),
+                        kMaxNameLength));
   }
   for (const char c : name) {
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
@@ -96,9 +96,9 @@ absl::Status Missing(const FieldPath& path, std::string_view what) {
 
 absl::StatusOr<map::GeodeticPoint> CheckPoint(const v1::GeodeticPoint& point,
                                               const FieldPath& path) {
-  FATHOM_RETURN_IF_ERROR(
-      CheckNumber(point.latitude_deg(), {.min = -90, .max = 90, .unit = "deg"},
-                  FieldPath(path, "latitude_deg")));
+  FATHOM_RETURN_IF_ERROR(CheckNumber(point.latitude_deg(),
+                                     {.min = -90, .max = 90, .unit = "deg"},
+                                     FieldPath(path, "latitude_deg")));
   FATHOM_RETURN_IF_ERROR(CheckNumber(point.longitude_deg(),
                                      {.min = -180, .max = 180, .unit = "deg"},
                                      FieldPath(path, "longitude_deg")));
