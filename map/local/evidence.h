@@ -1,0 +1,66 @@
+// What soundings alone say about one cell: sufficient statistics, 24 bytes.
+//
+// Each sounding is z_i with stated variance s_i^2, weight w_i = 1 / s_i^2. The
+// cell holds sum w, the weighted mean and the weighted scatter about it. From
+// these every estimator but `nervegna` computes its answer when it is asked,
+// so nothing of the prior is mixed in and evidence of two vehicles, or of
+// before and after a transfer, merges exactly: any order and any grouping
+// gives the same numbers up to rounding of the floats.
+//
+// Single precision is enough: at 100 m depth a float resolves 8 um, and the
+// mean is updated by differences. Stated standard deviations below kMinStdM
+// count as kMinStdM, so that no weight overflows and no sounding is absolute.
+//
+// Source: weighted Welford update (West 1979, doi:10.1145/359146.359153) and
+// pairwise merge (Chan, Golub, LeVeque 1983,
+// doi:10.1080/00031305.1983.10483115). Plain data, no invariant hidden: storage
+// writes the fields as they are.
+
+#ifndef FATHOM_MAP_LOCAL_EVIDENCE_H_
+#define FATHOM_MAP_LOCAL_EVIDENCE_H_
+
+#include <cstdint>
+#include <limits>
+
+namespace fathom::map {
+
+// The least standard deviation a sounding is taken for: 1 mm, an order below
+// the best echo sounder and the least the global map can store.
+inline constexpr float kMinStdM = 1e-3f;
+
+// Evidence::flags, the thesis's flags of fig. 4-4. Stored: never reuse a bit.
+// kDirectlyUpdated: a sounding fell in the cell (it stays over a transfer).
+inline constexpr std::uint16_t kDirectlyUpdated = 1;
+// kSmoothUpdated: `nervegna` wrote to the cell from a neighbour.
+inline constexpr std::uint16_t kSmoothUpdated = 2;
+
+struct Evidence {
+  float weight = 0.0f;   // Sum of 1 / s_i^2, 1/m^2; 0: no sounding.
+  float mean_m = 0.0f;   // Weighted mean depth; 0 while weight is 0.
+  float scatter = 0.0f;  // Sum of w_i (z_i - mean)^2, without unit: chi-square
+                         // of count - 1 degrees where the soundings agree.
+  // Least depth among the credible soundings (see IsCredible); NaN: none.
+  float shoalest_m = std::numeric_limits<float>::quiet_NaN();
+  std::uint32_t time_s = 0;  // Newest sounding, Unix seconds; 0: none.
+  std::uint16_t count = 0;   // Soundings. At 65535 count, weight and scatter
+                             // are halved: bounded, the mean stays.
+  std::uint16_t flags = 0;
+
+  // Adds one sounding. REQUIRES: both finite, std_m > 0.
+  void Add(float depth_m, float std_m, std::uint32_t sounding_time_s);
+
+  // Adds all soundings of `other`, as if each had been added.
+  void Merge(const Evidence& other);
+
+  bool empty() const { return count == 0; }
+};
+static_assert(sizeof(Evidence) == 24);
+
+// Whether a single sounding may by itself set the shoalest depth of a cell:
+// its 95 % uncertainty is within what IHO S-44 (edition 6) allows order 2
+// surveys, sqrt(1.0^2 + (0.023 d)^2) m.
+bool IsCredible(float depth_m, float std_m);
+
+}  // namespace fathom::map
+
+#endif  // FATHOM_MAP_LOCAL_EVIDENCE_H_

@@ -1,0 +1,102 @@
+// A square of 16 x 16 cells: the piece in which a local map is allocated,
+// copied on write and stored.
+//
+// Plain data: the storage codec writes each field as it is and reading it back
+// gives the same map, bit for bit. A block exists from the first time one of
+// its cells is touched; until then its area costs nothing.
+//
+// Cell k of a block is (k / 16 cells north, k % 16 cells east) of the block's
+// south-west corner. Cells beyond the map's north or east border exist in the
+// last blocks and are never touched.
+
+#ifndef FATHOM_MAP_LOCAL_LOCAL_BLOCK_H_
+#define FATHOM_MAP_LOCAL_LOCAL_BLOCK_H_
+
+#include <array>
+#include <compare>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "map/geodesy/depth_estimate.h"
+#include "map/local/evidence.h"
+
+namespace fathom::map {
+
+inline constexpr std::uint32_t kBlockSide = 16;
+inline constexpr std::size_t kBlockCells = 256;
+
+// A block of the map: counted northward and eastward from the south-west.
+struct BlockIndex {
+  std::uint32_t row = 0;  // North.
+  std::uint32_t col = 0;  // East.
+
+  friend bool operator==(const BlockIndex&, const BlockIndex&) = default;
+  friend auto operator<=>(const BlockIndex&, const BlockIndex&) = default;
+};
+
+// What was believed of one cell before this activity measured it.
+// kind kNone: nothing; kLand: dry, the numbers mean nothing.
+struct CellPrior {
+  float depth_m = 0.0f;
+  float std_m = 0.0f;
+  EvidenceKind kind = EvidenceKind::kNone;
+
+  friend bool operator==(const CellPrior&, const CellPrior&) = default;
+};
+
+// The priors of a block cell by cell, where they differ.
+struct PriorGrid {
+  std::array<float, kBlockCells> depth_m = {};
+  std::array<float, kBlockCells> std_m = {};
+  std::array<EvidenceKind, kBlockCells> kind = {};
+
+  friend bool operator==(const PriorGrid&, const PriorGrid&) = default;
+};
+
+// `nervegna` only: the estimate itself, prior and smoothing fused in.
+struct NervegnaCell {
+  float mean_m = 0.0f;
+  // Infinite: nothing is known of the cell (no prior, nothing written).
+  float variance_m2 = 0.0f;
+
+  friend bool operator==(const NervegnaCell&, const NervegnaCell&) = default;
+};
+
+struct LocalBlock {
+  // Since the start or the last transfer. All estimators fill it.
+  std::array<Evidence, kBlockCells> evidence = {};
+
+  // What a transfer has already carried to the global map; empty, or 256.
+  // Readers merge both, so a transfer changes no answer of this map; the next
+  // transfer moves `evidence` alone.
+  std::vector<Evidence> transferred;
+
+  // Asked for once, when the block was first touched, and kept with it: so a
+  // replay gives the same map whatever the global map has become.
+  CellPrior uniform_prior;  // Of every cell, when prior_grid is null.
+  // Never changed once made, and so shared by all copies of the block.
+  std::shared_ptr<const PriorGrid> prior_grid;
+
+  // `nervegna`: 256 cells; other estimators: empty.
+  std::vector<NervegnaCell> nervegna;
+
+  CellPrior prior(std::size_t k) const {
+    if (prior_grid == nullptr) return uniform_prior;
+    return {prior_grid->depth_m[k], prior_grid->std_m[k], prior_grid->kind[k]};
+  }
+  // All soundings of the cell, transferred or not.
+  Evidence AllEvidence(std::size_t k) const {
+    Evidence all = evidence[k];
+    if (!transferred.empty()) all.Merge(transferred[k]);
+    return all;
+  }
+  bool measured(std::size_t k) const {
+    return (evidence[k].flags & kDirectlyUpdated) != 0;
+  }
+};
+
+}  // namespace fathom::map
+
+#endif  // FATHOM_MAP_LOCAL_LOCAL_BLOCK_H_
