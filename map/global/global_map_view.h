@@ -1,0 +1,105 @@
+// GlobalMapView: the global map at one moment; what queries, storage and the
+// digest read.
+//
+// A view is a root square and the root tile of a tree that never changes. It
+// is copied at the cost of one reference count, stays valid whatever the
+// writer does, and any number of threads may use one view or copies of it. A
+// default-made view knows nothing.
+
+#ifndef FATHOM_MAP_GLOBAL_GLOBAL_MAP_VIEW_H_
+#define FATHOM_MAP_GLOBAL_GLOBAL_MAP_VIEW_H_
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "map/geodesy/depth_estimate.h"
+#include "map/geodesy/points.h"
+#include "map/global/cell_key.h"
+#include "map/global/leaf.h"
+#include "map/global/root_square.h"
+#include "map/global/tile.h"
+
+namespace fathom::map {
+
+// The least and the greatest depth in a part of the map (of means, without
+// their uncertainty; of every fine mean that a merged leaf replaced).
+struct DepthBounds {
+  float shoalest_m = 0;
+  float deepest_m = 0;
+};
+
+class GlobalMapView {
+ public:
+  GlobalMapView() = default;
+  // For GlobalMap and for tests.
+  GlobalMapView(const RootSquare& root, std::shared_ptr<const Tile> root_tile,
+                float tolerance_m)
+      : root_(root),
+        root_tile_(std::move(root_tile)),
+        tolerance_m_(tolerance_m) {}
+
+  // The leaf at a point: prior, measured or land, never smoothed. nullopt
+  // where nothing is known, outside the square and for coordinates that are
+  // not finite. shoalest_m is not kept (NaN). At most four tiles deep;
+  // <= 80 ns on a warm map.
+  std::optional<DepthEstimate> At(const GeodeticPoint& point) const;
+
+  // As At, with the leaf as it is kept and the cell that it fills; an unknown
+  // leaf too. nullopt outside the square.
+  std::optional<std::pair<CellKey, Leaf>> LeafAt(
+      const GeodeticPoint& point) const;
+
+  // Answers "could anything in this cell be shallower than z?" without opening
+  // it. nullopt: nothing is known in the cell. Where the map is coarser than
+  // the cell, the leaf's own bounds. O(1) for a tile's root cell, else at most
+  // 4096 slots. REQUIRES: a valid cell.
+  std::optional<DepthBounds> Bounds(const CellKey& cell) const;
+
+  // Calls visit(cell, leaf) for every leaf, unknown ones too, in Z-order over
+  // the whole square: the canonical order, which depends on the content alone.
+  void ForEachLeaf(
+      const std::function<void(const CellKey&, const Leaf&)>& visit) const;
+
+  // Calls visit(tile) for every tile, parents before children.
+  void ForEachTile(const std::function<void(const Tile&)>& visit) const;
+
+  const RootSquare& root() const { return root_; }
+  // Null only in a default-made view.
+  const std::shared_ptr<const Tile>& root_tile() const { return root_tile_; }
+  // What Leaf::residual_code is measured in (see GlobalMapOptions).
+  float tolerance_m() const { return tolerance_m_; }
+
+  // Leaves, unknown ones too: what max_cells bounds. 1 in an empty map. O(1).
+  std::uint64_t leaf_count() const {
+    return root_tile_ ? root_tile_->totals().leaves : 0;
+  }
+  // Leaves that hold a value. O(1).
+  std::uint64_t known_leaf_count() const {
+    return root_tile_ ? root_tile_->totals().known_leaves : 0;
+  }
+  // Memory of all tiles, allocator overhead estimated. O(1).
+  std::uint64_t memory_bytes() const {
+    return root_tile_ ? root_tile_->totals().memory_bytes : 0;
+  }
+
+ private:
+  RootSquare root_;
+  std::shared_ptr<const Tile> root_tile_;
+  float tolerance_m_ = 0;
+};
+
+// Calls visit(key, tile) for each tile of `now` whose own slots differ from
+// those of the same key in `old` (parents before children, siblings in
+// Z-order), and visit(key, nullptr) for each tile that is gone. Tiles that the
+// views share are not opened: the cost is that of what changed. A parent of a
+// changed tile is visited only if its own slots changed.
+// REQUIRES: both views are of one map; `old` may be default-made.
+void DiffTiles(const GlobalMapView& old, const GlobalMapView& now,
+               const std::function<void(const TileKey&, const Tile*)>& visit);
+
+}  // namespace fathom::map
+
+#endif  // FATHOM_MAP_GLOBAL_GLOBAL_MAP_VIEW_H_
