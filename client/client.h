@@ -121,7 +121,8 @@ class Client {
 
   // --- The mission (MissionService) ---
 
-  absl::StatusOr<v1::GetMissionStatusResponse> GetMissionStatus() const;
+  absl::StatusOr<v1::GetMissionStatusResponse> GetMissionStatus(
+      const v1::GetMissionStatusRequest& request = {}) const;
   absl::StatusOr<v1::StartActivityResponse> StartActivity(
       const v1::StartActivityRequest& request) const;
   absl::StatusOr<v1::CompleteActivityResponse> CompleteActivity(

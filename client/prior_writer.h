@@ -46,7 +46,6 @@ class PriorWriter {
 
  private:
   PriorWriter() = default;
-  absl::Status WriteRequest();
 
   grpc::ClientContext context_;
   v1::ImportPriorRequest request_;

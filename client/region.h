@@ -56,7 +56,7 @@ class RegionAssembler {
   // length); RESOURCE_EXHAUSTED for a grid above kMaxRegionCells.
   absl::Status Add(const v1::GetRegionResponse& message);
 
-  // The grid. Cells that no tile covered are unknown. Errors: INTERNAL when
+  // The grid; empties the assembler. Errors: INTERNAL when
   // no message came, or the tiles do not cover the grid.
   absl::StatusOr<Region> Take();
 
