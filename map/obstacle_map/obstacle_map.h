@@ -131,10 +131,8 @@ class ObstacleMap {
   absl::Status RestoreBlock(const ActivityId& id, BlockIndex index,
                             const LocalBlock& block);
   absl::Status RestoreContact(StoredContact stored);
-  void RestoreRevision(uint64_t revision, Time as_of) {
-    revision_ = revision;
-    as_of_ = as_of;
-  }
+  // Ends the restoring; must be called, and last.
+  void RestoreRevision(uint64_t revision, Time as_of);
 
  private:
   struct OpenActivity {

@@ -1,0 +1,274 @@
+#include "map/obstacle_map/obstacle_map.h"
+
+#include <algorithm>
+#include <array>
+
+#include "absl/strings/str_format.h"
+#include "base/status_macros.h"
+
+namespace fathom::map {
+namespace {
+
+absl::Status NotOpen(const ActivityId& id, bool was_started) {
+  if (was_started) {
+    return absl::FailedPreconditionError(absl::StrFormat(
+        "activity_id=%s has ended; start a new activity under a new id",
+        id.value));
+  }
+  return absl::NotFoundError(absl::StrFormat(
+      "activity_id=%s was never started; start it first", id.value));
+}
+
+}  // namespace
+
+ObstacleMap::ObstacleMap(MissionOptions options)
+    : options_(std::move(options)),
+      global_(options_.global),
+      global_view_(global_.View()),
+      contacts_(options_.contacts) {}
+
+absl::Status ObstacleMap::Start(const StartActivity& event) {
+  if (activity_slot_.contains(event.id)) {
+    return absl::AlreadyExistsError(
+        absl::StrFormat("activity_id=%s was used before in this mission; "
+                        "choose a new id",
+                        event.id.value));
+  }
+  if (open_.size() >= options_.max_open_activities) {
+    return absl::ResourceExhaustedError(absl::StrFormat(
+        "%u activities are open, max_open_activities=%u; complete one first",
+        static_cast<unsigned>(open_.size()), options_.max_open_activities));
+  }
+  if (activities_.size() >= options_.max_activities) {
+    return absl::ResourceExhaustedError(absl::StrFormat(
+        "the mission has had %u activities, max_activities=%u; start a new "
+        "mission",
+        static_cast<unsigned>(activities_.size()), options_.max_activities));
+  }
+  FATHOM_ASSIGN_OR_RETURN(LocalMap local, LocalMap::Create(event.options));
+  const uint64_t cells =
+      uint64_t{local.cells_north()} * uint64_t{local.cells_east()};
+  if (cells > options_.max_local_cells) {
+    return absl::ResourceExhaustedError(absl::StrFormat(
+        "the area has %u cells, max_local_cells=%u; make it smaller or its "
+        "cells larger",
+        cells, options_.max_local_cells));
+  }
+  const std::array<GeodeticPoint, 4> corners = local.Corners();
+  const RootSquare& root = options_.global.root;
+  if (std::none_of(corners.begin(), corners.end(), [&](const auto& corner) {
+        return root.Locate(corner, 0).has_value();
+      })) {
+    return absl::OutOfRangeError(
+        "no corner of the activity's area lies in the mission's square; "
+        "GetMissionStatus states the square");
+  }
+  ActivityView view;
+  view.id = event.id;
+  view.vehicle_id = event.vehicle_id;
+  view.start = event.start;
+  view.options = event.options;
+  view.cells_north = local.cells_north();
+  view.cells_east = local.cells_east();
+  activity_slot_.emplace(event.id, activities_.size());
+  activities_.push_back(nullptr);  // Filled by View().
+  open_.emplace(event.id, OpenActivity{std::move(local), std::move(view)});
+  Advance(Time{});
+  return absl::OkStatus();
+}
+
+absl::StatusOr<LocalMap::UpdateResult> ObstacleMap::ApplyPing(
+    const Ping& ping) {
+  const auto found = open_.find(ping.activity);
+  if (found == open_.end()) {
+    return absl::NotFoundError(absl::StrFormat(
+        "activity_id=%s is not open", ping.activity.value));
+  }
+  OpenActivity& open = found->second;
+  LocalMap::UpdateResult result =
+      open.local.Update(ping, [this](const GeodeticPoint& point) {
+        return global_view_.At(point);
+      });
+  open.view.measurements_accepted += result.accepted;
+  open.view.rejects.Merge(result.rejects);
+  open.changed = true;
+  Advance(result.accepted > 0 ? ping.time : Time{});
+  return result;
+}
+
+ContactOutcome ObstacleMap::ApplyContact(const ContactReport& report) {
+  ContactOutcome outcome = contacts_.Apply(report);
+  if (!outcome.applied) {
+    contact_rejects_.Add(outcome.reason);
+  }
+  Advance(outcome.applied ? report.time : Time{});
+  return outcome;
+}
+
+absl::Status ObstacleMap::Drop(const DropContact& event) {
+  if (!contacts_.Drop(event.key, event.time)) {
+    return absl::NotFoundError(absl::StrFormat(
+        "no live contact contact_id=%s of source_id=%s",
+        event.key.contact.value, event.key.source.value));
+  }
+  Advance(Time{});
+  return absl::OkStatus();
+}
+
+TransferResult ObstacleMap::TransferEvidence(OpenActivity& open) {
+  TransferResult result;
+  result.leaves_before = global_view_.leaf_count();
+  const LocalMapView local = open.local.View();
+  const GlobalMap::CellSource evidence = [&local](const GeodeticPoint& center) {
+    return local.EvidenceAt(center);
+  };
+  local.ForEachMeasuredArea(
+      [&](const AreaCorners& corners, uint32_t measured_cells) {
+        result.local_cells += measured_cells;
+        const GlobalMap::WriteSummary written = global_.MergeArea(
+            {corners.sw, corners.nw, corners.ne, corners.se},
+            open.view.options.cell_size_m, evidence);
+        result.leaves_written += written.leaves_written;
+        result.degraded += written.degraded;
+      });
+  result.leaves_after_write = global_.leaf_count();
+  global_.Conglomerate();
+  global_view_ = global_.View();
+  result.leaves_after = global_view_.leaf_count();
+  return result;
+}
+
+absl::StatusOr<TransferResult> ObstacleMap::Transfer(const ActivityId& id) {
+  const auto found = open_.find(id);
+  if (found == open_.end()) {
+    return NotOpen(id, activity_slot_.contains(id));
+  }
+  OpenActivity& open = found->second;
+  const TransferResult result = TransferEvidence(open);
+  open.local.MarkTransferred();
+  open.changed = true;
+  Advance(Time{});
+  return result;
+}
+
+absl::StatusOr<TransferResult> ObstacleMap::Complete(const ActivityId& id,
+                                                     bool discard) {
+  const auto found = open_.find(id);
+  if (found == open_.end()) {
+    return NotOpen(id, activity_slot_.contains(id));
+  }
+  OpenActivity& open = found->second;
+  TransferResult result;
+  if (!discard) {
+    result = TransferEvidence(open);
+  }
+  open.view.cells_measured = open.local.View().cells_measured();
+  open.view.local.reset();
+  activities_[activity_slot_.at(id)] =
+      std::make_shared<const ActivityView>(std::move(open.view));
+  open_.erase(found);
+  Advance(Time{});
+  return result;
+}
+
+absl::StatusOr<ImportResult> ObstacleMap::Import(const RasterBlock& block,
+                                                 bool last) {
+  ImportResult result;
+  result.leaves_before = global_view_.leaf_count();
+  FATHOM_ASSIGN_OR_RETURN(const GlobalMap::ImportSummary imported,
+                          global_.ImportRaster(block));
+  result.cells_with_depth = imported.cells_with_depth;
+  result.cells_land = imported.cells_land;
+  result.cells_unknown = imported.cells_unknown;
+  result.cells_outside = imported.cells_outside;
+  result.degraded = imported.degraded;
+  if (last) {
+    global_.Conglomerate();
+  }
+  global_view_ = global_.View();
+  result.leaves_after = global_view_.leaf_count();
+  Advance(Time{});
+  return result;
+}
+
+std::shared_ptr<const ObstacleMapView> ObstacleMap::View() {
+  for (auto& [id, open] : open_) {
+    if (open.changed) {
+      Refresh(open);
+    }
+  }
+  return std::make_shared<const ObstacleMapView>(ObstacleMapView::Parts{
+      .revision = revision_,
+      .as_of = as_of_,
+      .global = global_view_,
+      .activities = activities_,
+      .contacts = contacts_.View(),
+      .ageing_rate_m2_s = options_.ageing_rate_m2_s,
+  });
+}
+
+absl::Status ObstacleMap::RestoreTile(TileKey key, TileContent content) {
+  return global_.RestoreTile(key, std::move(content));
+}
+
+absl::Status ObstacleMap::RestoreActivity(const StoredActivity& stored) {
+  FATHOM_ASSIGN_OR_RETURN(LocalMap local,
+                          LocalMap::Create(stored.start.options));
+  ActivityView view;
+  view.id = stored.start.id;
+  view.vehicle_id = stored.start.vehicle_id;
+  view.start = stored.start.start;
+  view.options = stored.start.options;
+  view.cells_north = local.cells_north();
+  view.cells_east = local.cells_east();
+  view.measurements_accepted = stored.measurements_accepted;
+  view.rejects = stored.rejects;
+  view.cells_measured = stored.cells_measured;
+  if (!activity_slot_.emplace(view.id, activities_.size()).second) {
+    return absl::DataLossError(absl::StrFormat(
+        "activity_id=%s is stored twice", view.id.value));
+  }
+  if (stored.open) {
+    activities_.push_back(nullptr);
+    open_.emplace(view.id, OpenActivity{std::move(local), view});
+  } else {
+    activities_.push_back(
+        std::make_shared<const ActivityView>(std::move(view)));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ObstacleMap::RestoreBlock(const ActivityId& id, BlockIndex index,
+                                       const LocalBlock& block) {
+  const auto found = open_.find(id);
+  if (found == open_.end()) {
+    return absl::DataLossError(absl::StrFormat(
+        "a stored block names activity_id=%s, which is not open", id.value));
+  }
+  return found->second.local.RestoreBlock(index, block);
+}
+
+absl::Status ObstacleMap::RestoreContact(StoredContact stored) {
+  return contacts_.Restore(std::move(stored));
+}
+
+void ObstacleMap::RestoreRevision(uint64_t revision, Time as_of) {
+  global_view_ = global_.View();
+  revision_ = revision;
+  as_of_ = as_of;
+}
+
+void ObstacleMap::Advance(Time evidence_time) {
+  ++revision_;
+  as_of_ = std::max(as_of_, evidence_time);
+}
+
+void ObstacleMap::Refresh(OpenActivity& open) {
+  open.view.local = open.local.View();
+  open.view.cells_measured = open.view.local->cells_measured();
+  activities_[activity_slot_.at(open.view.id)] =
+      std::make_shared<const ActivityView>(open.view);
+  open.changed = false;
+}
+
+}  // namespace fathom::map
