@@ -26,8 +26,8 @@
 
 namespace fathom::map {
 
-inline constexpr float kMinStdM = 0x1p-10f;
-inline constexpr float kMaxStdM = 0x1p10f;
+inline constexpr float kMinLeafStdM = 0x1p-10f;
+inline constexpr float kMaxLeafStdM = 0x1p10f;
 inline constexpr std::uint16_t kMaxStdBits = 20 << 9;
 
 // Land is solid at every depth that a vessel can have. Every land leaf holds
@@ -38,8 +38,8 @@ inline constexpr float kLandDepthM = -100.0f;
 
 // What a chart or an estimate may claim. Deeper than any ocean, higher than any
 // shore that matters: outside it a depth is a mistake of units.
-inline constexpr float kMinDepthM = -1000.0f;
-inline constexpr float kMaxDepthM = 12000.0f;
+inline constexpr float kMinChartDepthM = -1000.0f;
+inline constexpr float kMaxChartDepthM = 12000.0f;
 
 enum class LeafKind : std::uint8_t {
   kUnknown = 0,
@@ -48,10 +48,10 @@ enum class LeafKind : std::uint8_t {
   kLand = 3,
 };
 
-// The 14 low bits for a std, rounded to nearest and clamped to [kMinStdM,
-// kMaxStdM]. REQUIRES: std_m is not NaN.
+// The 14 low bits for a std, rounded to nearest and clamped to [kMinLeafStdM,
+// kMaxLeafStdM]. REQUIRES: std_m is not NaN.
 constexpr std::uint16_t EncodeStd(float std_m) {
-  const float clamped = std::clamp(std_m, kMinStdM, kMaxStdM);
+  const float clamped = std::clamp(std_m, kMinLeafStdM, kMaxLeafStdM);
   const std::uint32_t bits = std::bit_cast<std::uint32_t>(clamped);
   return static_cast<std::uint16_t>(
       (bits - (std::uint32_t{127 - 10} << 23) + (1u << 13)) >> 14);

@@ -26,7 +26,8 @@ struct RasterBlock {
   std::uint32_t rows = 0;     // North to south, >= 1.
   std::uint32_t columns = 0;  // West to east, >= 1.
   // Row-major from the north-west, rows x columns. Depth below the mission's
-  // datum, metres, positive down, in [kMinDepthM, kMaxDepthM]; NaN: unknown.
+  // datum, metres, positive down, in [kMinChartDepthM, kMaxChartDepthM]; NaN:
+  // unknown.
   std::vector<float> depth_m;
   // 1 sigma, metres, > 0; rows x columns, or one value for all cells. A cell
   // whose std is NaN is unknown.
