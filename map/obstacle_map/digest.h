@@ -23,9 +23,7 @@ class Digest64 {
   void Add(uint64_t word) { hash_ = (hash_ ^ word) * kPrime; }
   // Bit pattern of the value: -0.0 differs from 0.0, every NaN payload counts.
   void Add(double value) { Add(std::bit_cast<uint64_t>(value)); }
-  void Add(float value) {
-    Add(uint64_t{std::bit_cast<uint32_t>(value)});
-  }
+  void Add(float value) { Add(uint64_t{std::bit_cast<uint32_t>(value)}); }
   // Length first, so that ("ab", "c") differs from ("a", "bc").
   void Add(std::string_view text) {
     Add(uint64_t{text.size()});

@@ -19,6 +19,19 @@ absl::Status NotOpen(const ActivityId& id, bool was_started) {
       "activity_id=%s was never started; start it first", id.value));
 }
 
+// Whether any corner cell of the area lies in the square.
+bool Overlaps(const RootSquare& root, const LocalMapView& area) {
+  const int32_t north = static_cast<int32_t>(area.cells_north()) - 1;
+  const int32_t east = static_cast<int32_t>(area.cells_east()) - 1;
+  const std::array<CellIndex, 4> corners = {
+      CellIndex{0, 0}, CellIndex{north, 0}, CellIndex{0, east},
+      CellIndex{north, east}};
+  return std::any_of(
+      corners.begin(), corners.end(), [&](const CellIndex& corner) {
+        return root.Locate(area.CellCenter(corner), 0).has_value();
+      });
+}
+
 }  // namespace
 
 ObstacleMap::ObstacleMap(MissionOptions options)
@@ -46,19 +59,16 @@ absl::Status ObstacleMap::Start(const StartActivity& event) {
         static_cast<unsigned>(activities_.size()), options_.max_activities));
   }
   FATHOM_ASSIGN_OR_RETURN(LocalMap local, LocalMap::Create(event.options));
+  const LocalMapView empty = local.View();
   const uint64_t cells =
-      uint64_t{local.cells_north()} * uint64_t{local.cells_east()};
+      uint64_t{empty.cells_north()} * uint64_t{empty.cells_east()};
   if (cells > options_.max_local_cells) {
     return absl::ResourceExhaustedError(absl::StrFormat(
         "the area has %u cells, max_local_cells=%u; make it smaller or its "
         "cells larger",
         cells, options_.max_local_cells));
   }
-  const std::array<GeodeticPoint, 4> corners = local.Corners();
-  const RootSquare& root = options_.global.root;
-  if (std::none_of(corners.begin(), corners.end(), [&](const auto& corner) {
-        return root.Locate(corner, 0).has_value();
-      })) {
+  if (!Overlaps(options_.global.root, empty)) {
     return absl::OutOfRangeError(
         "no corner of the activity's area lies in the mission's square; "
         "GetMissionStatus states the square");
@@ -68,8 +78,8 @@ absl::Status ObstacleMap::Start(const StartActivity& event) {
   view.vehicle_id = event.vehicle_id;
   view.start = event.start;
   view.options = event.options;
-  view.cells_north = local.cells_north();
-  view.cells_east = local.cells_east();
+  view.cells_north = empty.cells_north();
+  view.cells_east = empty.cells_east();
   activity_slot_.emplace(event.id, activities_.size());
   activities_.push_back(nullptr);  // Filled by View().
   open_.emplace(event.id, OpenActivity{std::move(local), std::move(view)});
@@ -81,14 +91,13 @@ absl::StatusOr<LocalMap::UpdateResult> ObstacleMap::ApplyPing(
     const Ping& ping) {
   const auto found = open_.find(ping.activity);
   if (found == open_.end()) {
-    return absl::NotFoundError(absl::StrFormat(
-        "activity_id=%s is not open", ping.activity.value));
+    return absl::NotFoundError(
+        absl::StrFormat("activity_id=%s is not open", ping.activity.value));
   }
   OpenActivity& open = found->second;
-  LocalMap::UpdateResult result =
-      open.local.Update(ping, [this](const GeodeticPoint& point) {
-        return global_view_.At(point);
-      });
+  LocalMap::UpdateResult result = open.local.Update(
+      ping,
+      [this](const GeodeticPoint& point) { return global_view_.At(point); });
   open.view.measurements_accepted += result.accepted;
   open.view.rejects.Merge(result.rejects);
   open.changed = true;
@@ -98,43 +107,43 @@ absl::StatusOr<LocalMap::UpdateResult> ObstacleMap::ApplyPing(
 
 ContactOutcome ObstacleMap::ApplyContact(const ContactReport& report) {
   ContactOutcome outcome = contacts_.Apply(report);
-  if (!outcome.applied) {
-    contact_rejects_.Add(outcome.reason);
+  if (!outcome.applied && outcome.reason.has_value()) {
+    contact_rejects_.Add(*outcome.reason);
   }
   Advance(outcome.applied ? report.time : Time{});
   return outcome;
 }
 
-absl::Status ObstacleMap::Drop(const DropContact& event) {
-  if (!contacts_.Drop(event.key, event.time)) {
-    return absl::NotFoundError(absl::StrFormat(
-        "no live contact contact_id=%s of source_id=%s",
-        event.key.contact.value, event.key.source.value));
+absl::StatusOr<ContactOutcome> ObstacleMap::Drop(const DropContact& event) {
+  ContactOutcome outcome = contacts_.Drop(event.key, event.time);
+  if (!outcome.applied) {
+    return absl::NotFoundError(
+        absl::StrFormat("no live contact contact_id=%s of source_id=%s",
+                        event.key.contact.value, event.key.source.value));
   }
   Advance(Time{});
-  return absl::OkStatus();
+  return outcome;
 }
 
 TransferResult ObstacleMap::TransferEvidence(OpenActivity& open) {
   TransferResult result;
-  result.leaves_before = global_view_.leaf_count();
+  result.leaves_before = global_view_.known_leaf_count();
   const LocalMapView local = open.local.View();
   const GlobalMap::CellSource evidence = [&local](const GeodeticPoint& center) {
     return local.EvidenceAt(center);
   };
   local.ForEachMeasuredArea(
-      [&](const AreaCorners& corners, uint32_t measured_cells) {
+      [&](const AreaCorners& corners, size_t measured_cells) {
         result.local_cells += measured_cells;
-        const GlobalMap::WriteSummary written = global_.MergeArea(
-            {corners.sw, corners.nw, corners.ne, corners.se},
-            open.view.options.cell_size_m, evidence);
+        const GlobalMap::WriteSummary written =
+            global_.MergeArea(corners, open.view.options.cell_size_m, evidence);
         result.leaves_written += written.leaves_written;
         result.degraded += written.degraded;
       });
-  result.leaves_after_write = global_.leaf_count();
+  result.leaves_after_write = global_.View().known_leaf_count();
   global_.Conglomerate();
   global_view_ = global_.View();
-  result.leaves_after = global_view_.leaf_count();
+  result.leaves_after = global_view_.known_leaf_count();
   return result;
 }
 
@@ -174,7 +183,7 @@ absl::StatusOr<TransferResult> ObstacleMap::Complete(const ActivityId& id,
 absl::StatusOr<ImportResult> ObstacleMap::Import(const RasterBlock& block,
                                                  bool last) {
   ImportResult result;
-  result.leaves_before = global_view_.leaf_count();
+  result.leaves_before = global_view_.known_leaf_count();
   FATHOM_ASSIGN_OR_RETURN(const GlobalMap::ImportSummary imported,
                           global_.ImportRaster(block));
   result.cells_with_depth = imported.cells_with_depth;
@@ -186,7 +195,7 @@ absl::StatusOr<ImportResult> ObstacleMap::Import(const RasterBlock& block,
     global_.Conglomerate();
   }
   global_view_ = global_.View();
-  result.leaves_after = global_view_.leaf_count();
+  result.leaves_after = global_view_.known_leaf_count();
   Advance(Time{});
   return result;
 }
@@ -219,14 +228,15 @@ absl::Status ObstacleMap::RestoreActivity(const StoredActivity& stored) {
   view.vehicle_id = stored.start.vehicle_id;
   view.start = stored.start.start;
   view.options = stored.start.options;
-  view.cells_north = local.cells_north();
-  view.cells_east = local.cells_east();
+  const LocalMapView empty = local.View();
+  view.cells_north = empty.cells_north();
+  view.cells_east = empty.cells_east();
   view.measurements_accepted = stored.measurements_accepted;
   view.rejects = stored.rejects;
   view.cells_measured = stored.cells_measured;
   if (!activity_slot_.emplace(view.id, activities_.size()).second) {
-    return absl::DataLossError(absl::StrFormat(
-        "activity_id=%s is stored twice", view.id.value));
+    return absl::DataLossError(
+        absl::StrFormat("activity_id=%s is stored twice", view.id.value));
   }
   if (stored.open) {
     activities_.push_back(nullptr);
@@ -252,10 +262,12 @@ absl::Status ObstacleMap::RestoreContact(StoredContact stored) {
   return contacts_.Restore(std::move(stored));
 }
 
-void ObstacleMap::RestoreRevision(uint64_t revision, Time as_of) {
+absl::Status ObstacleMap::RestoreRevision(uint64_t revision, Time as_of) {
+  FATHOM_RETURN_IF_ERROR(global_.FinishRestore());
   global_view_ = global_.View();
   revision_ = revision;
   as_of_ = as_of;
+  return absl::OkStatus();
 }
 
 void ObstacleMap::Advance(Time evidence_time) {

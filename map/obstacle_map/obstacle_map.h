@@ -100,8 +100,9 @@ class ObstacleMap {
   // changes only counters.
   ContactOutcome ApplyContact(const ContactReport& report);
 
-  // Closes a track. Errors: NOT_FOUND.
-  absl::Status Drop(const DropContact& event);
+  // Closes a track; the outcome holds the marker for the history. Errors:
+  // NOT_FOUND.
+  absl::StatusOr<ContactOutcome> Drop(const DropContact& event);
 
   // Copies the evidence gathered since the last transfer into the global map
   // and conglomerates it (section 4.4.4; departures: domain.md section 5).
@@ -131,8 +132,9 @@ class ObstacleMap {
   absl::Status RestoreBlock(const ActivityId& id, BlockIndex index,
                             const LocalBlock& block);
   absl::Status RestoreContact(StoredContact stored);
-  // Ends the restoring; must be called, and last.
-  void RestoreRevision(uint64_t revision, Time as_of);
+  // Ends the restoring; must be called, and last. Errors: DATA_LOSS (tiles
+  // are missing or hang on none).
+  absl::Status RestoreRevision(uint64_t revision, Time as_of);
 
  private:
   struct OpenActivity {

@@ -1,0 +1,194 @@
+#include "map/obstacle_map/obstacle_map_view.h"
+
+#include <utility>
+
+#include "map/obstacle_map/digest.h"
+
+namespace fathom::map {
+namespace {
+
+SeabedEstimate FromActivity(const DepthEstimate& estimate,
+                            const ActivityView& activity) {
+  return {.estimate = estimate, .local = true, .activity = &activity.id};
+}
+
+bool IsMeasured(const std::optional<DepthEstimate>& estimate) {
+  return estimate.has_value() && estimate->kind == EvidenceKind::kMeasured;
+}
+
+void AddEvidence(const Evidence& evidence, Digest64& digest) {
+  digest.Add(evidence.weight);
+  digest.Add(evidence.mean_m);
+  digest.Add(evidence.scatter);
+  digest.Add(evidence.shoalest_m);
+  digest.Add(uint64_t{evidence.time_s});
+  digest.Add(uint64_t{evidence.count} << 16 | evidence.flags);
+}
+
+void AddBlock(BlockIndex index, const LocalBlock& block, Digest64& digest) {
+  digest.Add(uint64_t{index.row} << 32 | index.col);
+  for (std::size_t k = 0; k < kBlockCells; ++k) {
+    AddEvidence(block.evidence[k], digest);
+    const CellPrior prior = block.prior(k);
+    digest.Add(prior.depth_m);
+    digest.Add(prior.std_m);
+    digest.Add(static_cast<uint64_t>(prior.kind));
+  }
+  for (const Evidence& evidence : block.transferred) {
+    AddEvidence(evidence, digest);
+  }
+  for (const NervegnaCell& cell : block.nervegna) {
+    digest.Add(cell.mean_m);
+    digest.Add(cell.variance_m2);
+  }
+}
+
+void AddPoint(const ContactPoint& point, Digest64& digest) {
+  digest.Add(static_cast<uint64_t>(point.contact_class) << 8 |
+             static_cast<uint64_t>(point.status));
+  for (const Time time : {point.time, point.report_time, point.track_start}) {
+    digest.Add(static_cast<uint64_t>(time.time_since_epoch().count()));
+  }
+  digest.Add(point.frame_origin.latitude_deg);
+  digest.Add(point.frame_origin.longitude_deg);
+  for (const double value : point.x) {
+    digest.Add(value);
+  }
+  for (const double value : point.P.reshaped()) {
+    digest.Add(value);
+  }
+  for (const double value : {point.top_depth_m, point.keel_depth_m,
+                             point.depth_std_m, point.radius_m}) {
+    digest.Add(value);
+  }
+  digest.Add(point.report_count);
+}
+
+void AddActivity(const ActivityView& activity, Digest64& digest) {
+  digest.Add(std::string_view(activity.id.value));
+  digest.Add(activity.measurements_accepted);
+  digest.Add(activity.rejects.total());
+  digest.Add(activity.cells_measured);
+  if (activity.local.has_value()) {
+    activity.local->ForEachBlock(
+        [&digest](BlockIndex index, const LocalBlock& block) {
+          AddBlock(index, block, digest);
+        });
+  }
+}
+
+void AddContact(const Contact& contact, Digest64& digest) {
+  digest.Add(std::string_view(contact.key().source.value));
+  digest.Add(std::string_view(contact.key().contact.value));
+  const TrackHistory& history = contact.history();
+  for (std::size_t i = 0; i < history.size(); ++i) {
+    AddPoint(history[i], digest);
+  }
+}
+
+}  // namespace
+
+ObstacleMapView::ObstacleMapView(Parts parts) : parts_(std::move(parts)) {
+  for (auto it = parts_.activities.rbegin(); it != parts_.activities.rend();
+       ++it) {
+    if ((*it)->open()) {
+      open_newest_first_.push_back(it->get());
+    }
+  }
+}
+
+const ActivityView* ObstacleMapView::FindActivity(const ActivityId& id) const {
+  for (const auto& activity : parts_.activities) {
+    if (activity->id == id) {
+      return activity.get();
+    }
+  }
+  return nullptr;
+}
+
+std::optional<SeabedEstimate> ObstacleMapView::SeabedAt(
+    const GeodeticPoint& point, LayerChoice layers) const {
+  std::optional<SeabedEstimate> smoothed;
+  if (layers != LayerChoice::kGlobalOnly) {
+    for (const ActivityView* activity : open_newest_first_) {
+      const std::optional<DepthEstimate> local = activity->local->At(point);
+      if (IsMeasured(local)) {
+        return FromActivity(*local, *activity);
+      }
+      if (local.has_value() && !smoothed.has_value()) {
+        smoothed = FromActivity(*local, *activity);
+      }
+    }
+  }
+  std::optional<DepthEstimate> chart;
+  if (layers != LayerChoice::kLocalOnly) {
+    chart = parts_.global.At(point);
+  }
+  if (IsMeasured(chart) || (chart.has_value() && !smoothed.has_value()) ||
+      (chart.has_value() && chart->kind == EvidenceKind::kLand)) {
+    return SeabedEstimate{.estimate = *chart};
+  }
+  if (smoothed.has_value()) {
+    // Smoothing may know less of a place than a good chart does.
+    if (chart.has_value() && chart->std_m < smoothed->estimate.std_m) {
+      return SeabedEstimate{.estimate = *chart};
+    }
+    return smoothed;
+  }
+  if (layers != LayerChoice::kGlobalOnly) {
+    for (const ActivityView* activity : open_newest_first_) {
+      const std::optional<DepthEstimate> prior =
+          activity->local->DefaultPrior();
+      if (prior.has_value() && activity->local->Contains(point)) {
+        return FromActivity(*prior, *activity);
+      }
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<SeabedEstimate> ObstacleMapView::SeabedInActivity(
+    const ActivityView& activity, const GeodeticPoint& point) const {
+  if (!activity.open() || !activity.local->Contains(point)) {
+    return std::nullopt;
+  }
+  std::optional<DepthEstimate> local = activity.local->At(point);
+  if (!local.has_value()) {
+    local = activity.local->DefaultPrior();
+  }
+  if (!local.has_value()) {
+    return std::nullopt;
+  }
+  return FromActivity(*local, activity);
+}
+
+ObstacleAnswer ObstacleMapView::Answer(const ObstacleQuery& query) const {
+  return map::Answer(query, SeabedAt(query.position), parts_.contacts,
+                     {.ageing_rate_m2_s = parts_.ageing_rate_m2_s});
+}
+
+std::string ObstacleMapView::Digest() const {
+  Digest64 digest;
+  parts_.global.ForEachLeaf([&digest](const CellKey& key, const Leaf& leaf) {
+    digest.Add(uint64_t{key.level} << 56 ^ uint64_t{key.row} << 28 ^ key.col);
+    digest.Add(leaf.depth_m);
+    digest.Add(uint64_t{leaf.time_s} << 24 |
+               uint64_t{leaf.residual_code} << 16 | leaf.std_code);
+  });
+  for (const auto& activity : parts_.activities) {
+    AddActivity(*activity, digest);
+  }
+  parts_.contacts.ForEach(
+      [&digest](const Contact& contact) { AddContact(contact, digest); });
+  return digest.Hex();
+}
+
+uint64_t ObstacleMapView::memory_bytes() const {
+  uint64_t bytes = parts_.global.memory_bytes();
+  for (const ActivityView* activity : open_newest_first_) {
+    bytes += activity->local->memory_bytes();
+  }
+  return bytes;
+}
+
+}  // namespace fathom::map
