@@ -1,0 +1,54 @@
+// Moving obstacles: points with constant velocity, independent of the vehicle
+// (Nervegna 2002, section 3.6.1).
+
+#ifndef FATHOM_SIM_FEEDER_SHIP_H_
+#define FATHOM_SIM_FEEDER_SHIP_H_
+
+#include <string>
+#include <vector>
+
+#include "fathom/v1/types.pb.h"
+#include "sim_feeder/local_terrain.h"
+#include "sim_feeder/random.h"
+#include "sim_feeder/survey_area.h"
+#include "sim_feeder/track_plan.h"
+#include "sim_feeder/vehicle.h"
+
+namespace fathom::feeder {
+
+struct Ship {
+  // Contact id, "ship-1" and so on.
+  std::string id;
+  v1::ContactClass contact_class = v1::CONTACT_CLASS_VESSEL;
+  // At the start of the simulation, in the plane about the area's south-west.
+  PlanePoint start;
+  double north_m_s = 0.0;
+  double east_m_s = 0.0;
+
+  // Where it is `seconds` after the start.
+  PlanePoint PlaceAt(double seconds) const {
+    return {.north_m = start.north_m + seconds * north_m_s,
+            .east_m = start.east_m + seconds * east_m_s};
+  }
+};
+
+struct ShipOptions {
+  // 0 to 1000.
+  int count = 3;
+  // Of the run, seconds, > 0.
+  double duration_s = 600.0;
+  // How near the first ship comes to the vehicle, 40 % into the run, metres.
+  double crossing_m = 120.0;
+};
+
+// The first ship crosses near the vehicle; the others go their way within an
+// area's width about the area. Of 32 drawn courses a ship takes the first
+// that is 95 % over water (places off the terrain count as water), else the
+// wettest. Classes take turns. Deterministic in `random`.
+std::vector<Ship> MakeShips(const LocalTerrain& terrain, const SurveyArea& area,
+                            const Vehicle& vehicle, const ShipOptions& options,
+                            Random& random);
+
+}  // namespace fathom::feeder
+
+#endif  // FATHOM_SIM_FEEDER_SHIP_H_
