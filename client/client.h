@@ -68,7 +68,7 @@ struct ClientOptions {
   // VerifyMission.
   std::chrono::milliseconds long_call_timeout{600'000};
   // Null: plain text, for loopback and Unix sockets.
-  std::shared_ptr<grpc::ChannelCredentials> credentials;
+  std::shared_ptr<grpc::ChannelCredentials> credentials = nullptr;
 };
 
 class Client {

@@ -17,7 +17,7 @@ namespace fathom::client {
 struct IngestStreamOptions {
   // Who sends: 1-64 characters of [A-Za-z0-9._-]. One stream of a kind per
   // source at a time.
-  std::string source_id;
+  std::string source_id = {};
 
   // The numbering epoch, or 0: the wall clock's microseconds when the stream
   // is opened, which is larger than any epoch opened before. A caller that
