@@ -80,7 +80,7 @@ class ContactMap {
   absl::Status Restore(StoredContact stored);
 
   // Contacts held and not dropped.
-  std::size_t live_count() const { return live_count_; }
+  std::size_t live_count() const;
   const ContactMapOptions& options() const { return *options_; }
 
  private:
@@ -96,7 +96,6 @@ class ContactMap {
   std::shared_ptr<ContactSet> set_;
   // Grows with each View(): pieces of this epoch are not yet shared.
   std::uint64_t epoch_ = 1;
-  std::size_t live_count_ = 0;
   // Dropped contacts by the time of their drop.
   std::set<std::pair<Time, ContactKey>> gone_;
 };

@@ -37,6 +37,11 @@ struct NearContact {
 // could add at most Q(7.5) = 3e-14 to a probability.
 inline constexpr double kNearSigmas = 7.5;
 
+// Contacts so vague that P < this for every place asked are near nowhere:
+// (radius + reach)^2 / (2 sqrt(det of the position's covariance)) bounds P.
+// With the default classes that takes days of silence.
+inline constexpr double kVanishing = 1e-10;
+
 // Contacts that would be further than this are never near, whatever their
 // uncertainty: their plane folds there, and one so vague has P < 1e-9.
 inline constexpr double kFarthestM = 2'500'000;
@@ -64,8 +69,9 @@ class ContactsView {
 
   // Every contact that at `t` may reach within reach_m of `point`: those
   // whose predicted position less its radius and kNearSigmas standard
-  // deviations is nearer than reach_m. In order of key. Far contacts cost a
-  // few ns each.
+  // deviations is nearer than reach_m (but see kVanishing, kFarthestM). In
+  // order of key. About 0.5 us for each; far ones are skipped by branches of
+  // a tree.
   void ForEachNear(const GeodeticPoint& point, double reach_m, Time t,
                    absl::FunctionRef<void(const NearContact&)> visit) const;
 

@@ -12,12 +12,13 @@ namespace fathom::map {
 //
 // offset_m: from the disc's centre to the mean, [n, e] metres.
 // covariance_m2: 2x2, symmetric, positive semidefinite. A standard deviation
-// below 1e-7 of the radius is taken as that: the edge is no sharper.
+// below 1e-4 of the radius is taken as that: the edge is no sharper.
 // radius_m >= 0; 0 gives 0.
 //
 // Relative error <= 1e-6 where the result is >= 1e-12, absolute error <= 1e-18
 // below. Result in [0, 1]. NaN if an argument is not finite. Isotropic check:
-// 1 - Q1(d/s, R/s), Marcum's Q. Cost below 1 us. Thread-safe.
+// 1 - Q1(d/s, R/s), Marcum's Q. Cost about 1 us (more
+// only where the radius is hundreds of standard deviations). Thread-safe.
 double DiscProbability(const Eigen::Vector2d& offset_m,
                        const Eigen::Matrix2d& covariance_m2, double radius_m);
 

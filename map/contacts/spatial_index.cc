@@ -1,0 +1,320 @@
+#include "map/contacts/spatial_index.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "map/contacts/contacts_view.h"
+
+namespace fathom::map {
+namespace {
+
+// A leaf of more entries divides.
+constexpr std::size_t kLeafEntries = 16;
+
+// Two bits a level. 20 levels: cells of 20 m; more contacts than kLeafEntries
+// in one stay together.
+constexpr int kLevels = 20;
+
+// Which child of a node at `level` (0: the root) holds the code.
+std::size_t ChildAt(std::uint64_t code, int level) {
+  return static_cast<std::size_t>(code >> (2 * (kLevels - 1 - level))) & 3u;
+}
+
+// The lower 20 bits of x, a zero behind each.
+std::uint64_t Spread(std::uint64_t x) {
+  x = (x | (x << 16)) & 0x0000ffff0000ffffu;
+  x = (x | (x << 8)) & 0x00ff00ff00ff00ffu;
+  x = (x | (x << 4)) & 0x0f0f0f0f0f0f0f0fu;
+  x = (x | (x << 2)) & 0x3333333333333333u;
+  return (x | (x << 1)) & 0x5555555555555555u;
+}
+
+std::uint64_t ToCode(const GeodeticPoint& point) {
+  constexpr double kCells = 1 << kLevels;
+  const auto index = [](double part) {
+    return static_cast<std::uint64_t>(
+        std::clamp(part * kCells, 0.0, kCells - 1.0));
+  };
+  return Spread(index((point.latitude_deg + 90.0) / 180.0)) << 1 |
+         Spread(index((point.longitude_deg + 180.0) / 360.0));
+}
+
+// The greatest 1 sigma in any direction of the 2x2 covariance at `first`.
+double GreatestStd(const Eigen::Matrix4d& P, int first) {
+  const double mean = 0.5 * (P(first, first) + P(first + 1, first + 1));
+  const double half = 0.5 * (P(first, first) - P(first + 1, first + 1));
+  return std::sqrt(mean + std::hypot(half, P(first, first + 1)));
+}
+
+// After how many reports the reach into the past is made afresh.
+constexpr std::uint64_t kAfresh = 32;
+
+// A little more than the value, to cover the rounding to float.
+float Above(double value) { return static_cast<float>(value * 1.000001); }
+
+double DistanceM(const UnitVector& a, const UnitVector& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double d = static_cast<double>(a[i]) - static_cast<double>(b[i]);
+    sum += d * d;
+  }
+  return std::sqrt(sum) * 6'400'000.0 + 2.0;
+}
+
+// What SpatialBounds says of one estimate predicted on by up to dt_s.
+struct Reach {
+  double base_m;
+  double speed_m_s;
+  double wander_m_s15;
+  double After(double dt_s) const {
+    return base_m + dt_s * speed_m_s + dt_s * std::sqrt(dt_s) * wander_m_s15;
+  }
+};
+
+Reach ReachOf(const ContactPoint& point, const ContactClassTable& classes) {
+  const double q = classes[static_cast<std::size_t>(point.contact_class)]
+                       .process_noise_m2_s3;
+  return {.base_m = point.radius_m + kNearSigmas * GreatestStd(point.P, 0),
+          .speed_m_s = std::hypot(point.x(2), point.x(3)) +
+                       kNearSigmas * GreatestStd(point.P, 2),
+          .wander_m_s15 = kNearSigmas * std::sqrt(q / 3.0)};
+}
+
+// How far from `place`, the newest, the contact may have been at any time
+// before: each estimate is asked until the next one came, the oldest also
+// back to the start of its life.
+double PastAfresh(const TrackHistory& history, const UnitVector& place,
+                  const ContactClassTable& classes) {
+  const ContactPoint& newest = history.newest();
+  double past_m = 0;
+  for (std::size_t i = 0; i < history.size(); ++i) {
+    const ContactPoint& point = history[i];
+    double span_s = 0;
+    if (i + 1 < history.size()) {
+      span_s = ToSeconds(history[i + 1].time - point.time);
+    }
+    if (i == 0) {
+      span_s = std::max(span_s, ToSeconds(point.time - point.track_start));
+    }
+    // On one plane the difference will do (1.1: what the plane shortens).
+    const double distance_m =
+        point.frame_origin == newest.frame_origin
+            ? 1.1 *
+                  std::hypot(point.x(0) - newest.x(0), point.x(1) - newest.x(1))
+            : DistanceM(place, ToUnitVector(point.Position()));
+    past_m =
+        std::max(past_m, distance_m + ReachOf(point, classes).After(span_s));
+  }
+  return past_m;
+}
+
+// The same from the entry before the newest estimate came, at least as wide.
+double PastFrom(const TrackHistory& history, const SpatialEntry& before,
+                const UnitVector& place, const ContactClassTable& classes) {
+  const double moved_m = DistanceM(place, before.bounds.low);
+  const ContactPoint& last = history[history.size() - 2];
+  const double span_s = ToSeconds(history.newest().time - last.time);
+  return moved_m + std::max(static_cast<double>(before.bounds.past_m),
+                            ReachOf(last, classes).After(span_s));
+}
+
+}  // namespace
+
+UnitVector ToUnitVector(const GeodeticPoint& point) {
+  constexpr double kRadPerDeg = std::numbers::pi / 180.0;
+  const double cos_lat = std::cos(point.latitude_deg * kRadPerDeg);
+  return {
+      static_cast<float>(cos_lat * std::cos(point.longitude_deg * kRadPerDeg)),
+      static_cast<float>(cos_lat * std::sin(point.longitude_deg * kRadPerDeg)),
+      static_cast<float>(std::sin(point.latitude_deg * kRadPerDeg))};
+}
+
+void SpatialBounds::Include(const SpatialBounds& other) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    low[i] = std::min(low[i], other.low[i]);
+    high[i] = std::max(high[i], other.high[i]);
+  }
+  base_m = std::max(base_m, other.base_m);
+  speed_m_s = std::max(speed_m_s, other.speed_m_s);
+  wander_m_s15 = std::max(wander_m_s15, other.wander_m_s15);
+  past_m = std::max(past_m, other.past_m);
+  least_wander_m_s15 = std::min(least_wander_m_s15, other.least_wander_m_s15);
+  radius_m = std::max(radius_m, other.radius_m);
+  oldest = std::min(oldest, other.oldest);
+  newest = std::max(newest, other.newest);
+}
+
+bool SpatialBounds::MayReach(const UnitVector& at, double reach_m,
+                             Time t) const {
+  float sum = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const float d = std::max({low[i] - at[i], at[i] - high[i], 0.0f});
+    sum += d * d;
+  }
+  // 2 m: the rounding of the unit vectors.
+  double room_m = reach_m + 2.0;
+  double within_m = 0.0;
+  if (t >= oldest) {
+    const double dt_s = ToSeconds(t - oldest);
+    within_m = static_cast<double>(base_m) +
+               dt_s * (static_cast<double>(speed_m_s) +
+                       std::sqrt(dt_s) * static_cast<double>(wander_m_s15));
+  }
+  if (t < newest) {
+    within_m = std::max(within_m, static_cast<double>(past_m));
+  } else {
+    // Each axis has a variance of q T^3 / 3 at least.
+    const double silent_s = ToSeconds(t - newest);
+    const double wander = static_cast<double>(least_wander_m_s15) / kNearSigmas;
+    const double radius = static_cast<double>(radius_m) + reach_m;
+    if (0.5 * radius * radius <
+        kVanishing * wander * wander * silent_s * silent_s * silent_s) {
+      return false;
+    }
+  }
+  room_m += within_m;
+  const double distance_m =
+      static_cast<double>(std::sqrt(sum)) * static_cast<double>(kPlaneRadiusM);
+  return distance_m <= room_m;
+}
+
+SpatialEntry MakeSpatialEntry(const Contact& contact,
+                              const ContactClassTable& classes,
+                              const std::optional<SpatialEntry>& before) {
+  const TrackHistory& history = contact.history();
+  const ContactPoint& newest = history.newest();
+  const GeodeticPoint place = newest.Position();
+  const Reach reach = ReachOf(newest, classes);
+  SpatialEntry entry{.contact = &contact, .code = ToCode(place), .bounds = {}};
+  SpatialBounds& bounds = entry.bounds;
+  bounds.low = bounds.high = ToUnitVector(place);
+  bounds.oldest = bounds.newest = newest.time;
+  bounds.radius_m = Above(newest.radius_m);
+  bounds.least_wander_m_s15 = static_cast<float>(reach.wander_m_s15 * 0.999999);
+  // From a drop on it is nowhere.
+  if (newest.status != ContactStatus::kDropped) {
+    bounds.base_m = Above(reach.base_m);
+    bounds.speed_m_s = Above(reach.speed_m_s);
+    bounds.wander_m_s15 = Above(reach.wander_m_s15);
+  }
+  bounds.past_m = Above(before.has_value() && newest.report_count % kAfresh != 0
+                            ? PastFrom(history, *before, bounds.low, classes)
+                            : PastAfresh(history, bounds.low, classes));
+  return entry;
+}
+
+struct SpatialIndex::Node {
+  std::uint64_t epoch = 0;
+  SpatialBounds bounds;
+  bool leaf = true;
+  std::array<std::shared_ptr<Node>, 4> children;
+  std::vector<SpatialEntry> entries;
+
+  void Bound() {
+    bounds = {};
+    for (const SpatialEntry& entry : entries) bounds.Include(entry.bounds);
+    for (const auto& child : children) {
+      if (child != nullptr) bounds.Include(child->bounds);
+    }
+  }
+  bool Empty() const {
+    return entries.empty() &&
+           std::all_of(children.begin(), children.end(),
+                       [](const auto& child) { return child == nullptr; });
+  }
+};
+
+SpatialIndex::Node& SpatialIndex::Own(std::shared_ptr<Node>& node,
+                                      std::uint64_t epoch) {
+  if (node == nullptr) {
+    node = std::make_shared<Node>();
+    node->epoch = epoch;
+  } else if (node->epoch != epoch) {
+    node = std::make_shared<Node>(*node);
+    node->epoch = epoch;
+  }
+  return *node;
+}
+
+void SpatialIndex::Insert(const SpatialEntry& entry, std::uint64_t epoch) {
+  std::shared_ptr<Node>* slot = &root_;
+  int level = 0;
+  while (true) {
+    Node& node = Own(*slot, epoch);
+    // Bounds only grow on the way down: no need to look at the siblings.
+    node.bounds.Include(entry.bounds);
+    if (node.leaf) {
+      node.entries.push_back(entry);
+      if (node.entries.size() <= kLeafEntries || level == kLevels) return;
+      node.leaf = false;
+      for (const SpatialEntry& moved : node.entries) {
+        Node& child = Own(node.children[ChildAt(moved.code, level)], epoch);
+        child.entries.push_back(moved);
+        child.bounds.Include(moved.bounds);
+      }
+      node.entries.clear();
+      // All of them may have gone to one child: divide that on its turn, when
+      // the next entry comes.
+      return;
+    }
+    slot = &node.children[ChildAt(entry.code, level)];
+    ++level;
+  }
+}
+
+std::optional<SpatialEntry> SpatialIndex::Remove(const Contact* contact,
+                                                 std::uint64_t code,
+                                                 std::uint64_t epoch) {
+  std::optional<SpatialEntry> removed;
+  std::array<std::shared_ptr<Node>*, kLevels + 1> path;
+  std::size_t depth = 0;
+  std::shared_ptr<Node>* slot = &root_;
+  while (*slot != nullptr) {
+    Node& node = Own(*slot, epoch);
+    path[depth++] = slot;
+    if (node.leaf) {
+      const auto found = std::find_if(
+          node.entries.begin(), node.entries.end(),
+          [contact](const SpatialEntry& e) { return e.contact == contact; });
+      if (found != node.entries.end()) {
+        removed = *found;
+        node.entries.erase(found);
+      }
+      break;
+    }
+    slot = &node.children[ChildAt(code, static_cast<int>(depth) - 1)];
+  }
+  while (depth > 0) {
+    std::shared_ptr<Node>& node = *path[--depth];
+    if (node->Empty()) {
+      node.reset();
+    } else {
+      node->Bound();
+    }
+  }
+  return removed;
+}
+
+void SpatialIndex::ForEachCandidate(
+    const GeodeticPoint& point, double reach_m, Time t,
+    absl::FunctionRef<void(const Contact&)> visit) const {
+  if (root_ == nullptr) return;
+  const UnitVector at = ToUnitVector(point);
+  // Depth first; at most three siblings wait on each level.
+  std::array<const Node*, 3 * kLevels + 4> waiting;
+  std::size_t count = 0;
+  waiting[count++] = root_.get();
+  while (count > 0) {
+    const Node& node = *waiting[--count];
+    if (!node.bounds.MayReach(at, reach_m, t)) continue;
+    for (const SpatialEntry& entry : node.entries) {
+      if (entry.bounds.MayReach(at, reach_m, t)) visit(*entry.contact);
+    }
+    for (const auto& child : node.children) {
+      if (child != nullptr) waiting[count++] = child.get();
+    }
+  }
+}
+
+}  // namespace fathom::map

@@ -1,0 +1,109 @@
+// Where contacts are and how far each may have got: a quadtree over latitude
+// and longitude that skips, whole branches at a time, contacts that cannot
+// reach a place at a time.
+//
+// It only ever skips: each bound is rounded outwards, and whoever asks checks
+// the candidates exactly (ContactsView::ForEachNear). So answers do not
+// depend on how the tree came about.
+//
+// Copy on write: nodes made since the last snapshot (same epoch) are changed
+// in place, others are copied along the path from the root. One thread
+// writes; a snapshot (a copy of the root's pointer) is immutable.
+
+#ifndef FATHOM_MAP_CONTACTS_SPATIAL_INDEX_H_
+#define FATHOM_MAP_CONTACTS_SPATIAL_INDEX_H_
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "absl/functional/function_ref.h"
+#include "base/time.h"
+#include "map/contacts/contact.h"
+#include "map/contacts/contact_class.h"
+#include "map/geodesy/points.h"
+
+namespace fathom::map {
+
+// Direction of the vertical of a place, Earth-fixed unit vector. Floats hold
+// it to 0.4 m.
+using UnitVector = std::array<float, 3>;
+UnitVector ToUnitVector(const GeodeticPoint& point);
+
+// A lower bound of the distance between two places on any contact's plane
+// that holds both, from the distance of their unit vectors: the smallest
+// radius of curvature, 6335 km, less 10 % for what a plane shortens within
+// kFarthestM and for rounding.
+inline constexpr float kPlaneRadiusM = 5'700'000;
+
+// The region of space and time that one contact, or all below a node, may be
+// in. At a time t not before `newest` it is within
+//   base_m + speed_m_s dt + wander_m_s15 dt^1.5,  dt = t - oldest,
+// of the box; at any earlier time within past_m.
+struct SpatialBounds {
+  UnitVector low = {2, 2, 2};
+  UnitVector high = {-2, -2, -2};
+  // Radius of the disc and kNearSigmas of the position.
+  float base_m = 0;
+  // Speed and kNearSigmas of it.
+  float speed_m_s = 0;
+  // kNearSigmas sqrt(q / 3).
+  float wander_m_s15 = 0;
+  // Over the whole history that is kept.
+  float past_m = 0;
+  // The least wander and the greatest radius of what is inside: after long
+  // silence it is too vague to matter anywhere (kVanishing).
+  float least_wander_m_s15 = std::numeric_limits<float>::infinity();
+  float radius_m = 0;
+  // Earliest and latest newest estimate.
+  Time oldest = Time::max();
+  Time newest = Time::min();
+
+  void Include(const SpatialBounds& other);
+  // Whether something in it may at `t` be within reach_m of `at`.
+  bool MayReach(const UnitVector& at, double reach_m, Time t) const;
+};
+
+// A contact in the tree. The pointer is the tree's holder's to keep valid.
+struct SpatialEntry {
+  const Contact* contact = nullptr;
+  // Its place in the tree: interleaved bits of longitude and latitude.
+  std::uint64_t code = 0;
+  SpatialBounds bounds;
+};
+
+// The entry for a contact. `before`: its entry before its newest estimate was
+// appended, if it had one: from it the new one follows in O(1), a little
+// wider; every 32nd report it is made afresh in O(estimates kept).
+SpatialEntry MakeSpatialEntry(const Contact& contact,
+                              const ContactClassTable& classes,
+                              const std::optional<SpatialEntry>& before);
+
+class SpatialIndex {
+ public:
+  // Adds an entry, or takes out and returns the entry of `contact` (which was
+  // added with `code`; nullopt if it is not there). `epoch`: nodes of another
+  // epoch are shared with a snapshot and are copied. O(depth).
+  void Insert(const SpatialEntry& entry, std::uint64_t epoch);
+  std::optional<SpatialEntry> Remove(const Contact* contact, std::uint64_t code,
+                                     std::uint64_t epoch);
+
+  // Every contact that may at `t` be within reach_m of `point`, and some that
+  // may not; in no particular order.
+  void ForEachCandidate(const GeodeticPoint& point, double reach_m, Time t,
+                        absl::FunctionRef<void(const Contact&)> visit) const;
+
+ private:
+  struct Node;
+  // The node, or a copy of it that this epoch may change.
+  static Node& Own(std::shared_ptr<Node>& node, std::uint64_t epoch);
+
+  std::shared_ptr<Node> root_;
+};
+
+}  // namespace fathom::map
+
+#endif  // FATHOM_MAP_CONTACTS_SPATIAL_INDEX_H_
