@@ -64,8 +64,16 @@ void SplitAny(const std::uint8_t* elements, std::size_t count,
       return Split<2>(elements, count, planes);
     case 4:
       return Split<4>(elements, count, planes);
-    default:
+    case 8:
       return Split<8>(elements, count, planes);
+    case 16:
+      return Split<16>(elements, count, planes);
+    default:
+      for (std::size_t k = 0; k < width; ++k) {
+        for (std::size_t i = 0; i < count; ++i) {
+          planes[k * count + i] = elements[i * width + k];
+        }
+      }
   }
 }
 
@@ -78,8 +86,16 @@ void JoinAny(const std::uint8_t* planes, std::size_t count, std::size_t width,
       return Join<2>(planes, count, elements);
     case 4:
       return Join<4>(planes, count, elements);
-    default:
+    case 8:
       return Join<8>(planes, count, elements);
+    case 16:
+      return Join<16>(planes, count, elements);
+    default:
+      for (std::size_t k = 0; k < width; ++k) {
+        for (std::size_t i = 0; i < count; ++i) {
+          elements[i * width + k] = planes[k * count + i];
+        }
+      }
   }
 }
 
@@ -153,6 +169,24 @@ void GetColumnBytes(ByteReader& reader, std::size_t count, std::size_t width,
   }
   if (!reader.ok()) return;
   JoinAny(planes.data(), count, width, static_cast<std::uint8_t*>(elements));
+}
+
+void PutRows(ByteSpan rows, std::size_t width, ByteWriter& writer) {
+  if (rows.empty()) return;
+  Bytes planes(rows.size());
+  SplitAny(rows.data(), rows.size() / width, width, planes.data());
+  Bytes scratch;
+  PutPlane(planes, scratch, writer);
+}
+
+Bytes GetRows(ByteReader& reader, std::size_t count, std::size_t width) {
+  if (!reader.ok() || count == 0) return {};
+  Bytes planes(count * width);
+  GetPlane(reader, planes);
+  if (!reader.ok()) return {};
+  Bytes rows(planes.size());
+  JoinAny(planes.data(), count, width, rows.data());
+  return rows;
 }
 
 }  // namespace fathom::storage

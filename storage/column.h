@@ -31,13 +31,21 @@ namespace fathom::storage {
 // Below this a zstd frame's own bytes (near 12) outweigh what it saves.
 inline constexpr std::size_t kMinZstdBytes = 48;
 
-// `count` elements of `width` bytes (1 to 8), little-endian machine order, at
-// `elements`. Cost: near 0.4 GB/s of input. Not for big-endian machines.
+// `count` elements of `width` bytes, in the order of memory, at `elements`:
+// numbers, or records of numbers without padding. Little-endian machines only
+// (checked when compiled).
 void PutColumnBytes(const void* elements, std::size_t count, std::size_t width,
                     ByteWriter& writer);
 // Fills `elements`; on failure the reader is failed and the content undefined.
 void GetColumnBytes(ByteReader& reader, std::size_t count, std::size_t width,
                     void* elements);
+
+// Records of `width` bytes each, row after row, in one plane: byte 0 of all
+// rows, then byte 1, and so on. For short tables of wide rows, where a frame
+// for each byte would cost more than it saves.
+void PutRows(ByteSpan rows, std::size_t width, ByteWriter& writer);
+// Empty if the reader is or becomes failed.
+Bytes GetRows(ByteReader& reader, std::size_t count, std::size_t width);
 
 template <typename T>
 concept ColumnElement = (std::is_arithmetic_v<T> && sizeof(T) <= 8) &&

@@ -4,7 +4,6 @@
 
 #include <cerrno>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 
 #include "absl/strings/str_format.h"
@@ -76,9 +75,10 @@ void Statement::BindInt(int parameter, std::int64_t value) {
 }
 
 void Statement::BindReal(int parameter, double value) {
-  if (!std::isfinite(value)) std::abort();  // REQUIRES of the header.
   const int result =
-      sqlite3_bind_double(statement_.get(), parameter + 1, value);
+      std::isfinite(value)
+          ? sqlite3_bind_double(statement_.get(), parameter + 1, value)
+          : SQLITE_MISMATCH;
   if (bind_result_ == SQLITE_OK) bind_result_ = result;
 }
 
@@ -96,6 +96,11 @@ void Statement::BindBlob(int parameter, ByteSpan bytes) {
           ? sqlite3_bind_zeroblob(statement_.get(), parameter + 1, 0)
           : sqlite3_bind_blob64(statement_.get(), parameter + 1, bytes.data(),
                                 bytes.size(), SQLITE_STATIC);
+  if (bind_result_ == SQLITE_OK) bind_result_ = result;
+}
+
+void Statement::BindNull(int parameter) {
+  const int result = sqlite3_bind_null(statement_.get(), parameter + 1);
   if (bind_result_ == SQLITE_OK) bind_result_ = result;
 }
 
@@ -181,6 +186,15 @@ absl::StatusOr<Connection> Connection::Open(const std::string& path,
   sqlite3_db_config(database, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
   // A file from elsewhere must not run functions that its schema names.
   sqlite3_db_config(database, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+  // Takes away the hook that checkpoints by size, then puts ours there.
+  sqlite3_wal_autocheckpoint(database, 0);
+  sqlite3_wal_hook(
+      database,
+      [](void* frames, sqlite3*, const char*, int count) {
+        *static_cast<int*>(frames) = count;
+        return SQLITE_OK;
+      },
+      connection.log_frames_.get());
   return connection;
 }
 
@@ -221,6 +235,7 @@ absl::StatusOr<int> Connection::CheckpointPassive() {
   const int result = sqlite3_wal_checkpoint_v2(
       database_.get(), nullptr, SQLITE_CHECKPOINT_PASSIVE, &in_log, &copied);
   if (result != SQLITE_OK) return Error(result, "checkpoint");
+  *log_frames_ = in_log - copied;
   return in_log - copied;
 }
 
@@ -229,6 +244,24 @@ absl::Status Connection::CheckpointTruncate() {
       database_.get(), nullptr, SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
   return result == SQLITE_OK ? absl::OkStatus()
                              : Error(result, "truncating checkpoint");
+}
+
+std::uint64_t Connection::LogBytes() const {
+  sqlite3_stmt* prepared = nullptr;
+  std::uint64_t page_bytes = 0;
+  if (*log_frames_ != 0 &&
+      sqlite3_prepare_v2(database_.get(), "PRAGMA page_size", -1, &prepared,
+                         nullptr) == SQLITE_OK &&
+      sqlite3_step(prepared) == SQLITE_ROW) {
+    page_bytes = static_cast<std::uint64_t>(sqlite3_column_int(prepared, 0));
+  }
+  sqlite3_finalize(prepared);
+  return static_cast<std::uint64_t>(*log_frames_) * (page_bytes + 24);
+}
+
+void Connection::CheckpointOnClose() {
+  sqlite3_db_config(database_.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 0,
+                    nullptr);
 }
 
 absl::Status Connection::BackupTo(const std::string& path) {

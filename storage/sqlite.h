@@ -43,10 +43,12 @@ class Statement {
   void BindUint(int parameter, std::uint64_t value) {
     BindInt(parameter, static_cast<std::int64_t>(value));
   }
-  // REQUIRES: finite (SQLite turns NaN into NULL). -0.0 comes back as 0.0.
+  // -0.0 comes back as 0.0. What is not finite is INVALID_ARGUMENT at the next
+  // Step: SQLite would store NaN as NULL.
   void BindReal(int parameter, double value);
   void BindText(int parameter, std::string_view text);
   void BindBlob(int parameter, ByteSpan bytes);
+  void BindNull(int parameter);
 
   // To the next row. True if there is one, false at the end.
   absl::StatusOr<bool> Step();
@@ -88,8 +90,9 @@ class Connection {
 
   Connection() = default;
 
-  // Opens `path`; nothing is read yet. In every mode closing does not
-  // checkpoint until EnableCheckpointOnClose.
+  // Opens `path`; nothing is read yet. SQLite never checkpoints by itself:
+  // neither by the log's size nor when the connection closes (but see
+  // CheckpointOnClose).
   static absl::StatusOr<Connection> Open(const std::string& path, Mode mode);
 
   // Runs SQL (one or more statements) without parameters or results.
@@ -106,6 +109,14 @@ class Connection {
   // the way (SQLITE_CHECKPOINT_TRUNCATE).
   absl::Status CheckpointTruncate();
 
+  // Bytes of the write-ahead log that this connection's last commit left to
+  // be copied: 0 before the first. Only for the one writing connection.
+  std::uint64_t LogBytes() const;
+
+  // From here on closing checkpoints and deletes the log, as SQLite does by
+  // itself. Only for the one writing connection, when it is about to close.
+  void CheckpointOnClose();
+
   // Copies this database, as of one moment, to a new or empty one at `path`.
   absl::Status BackupTo(const std::string& path);
 
@@ -117,6 +128,9 @@ class Connection {
   };
   absl::Status Error(int result, std::string_view doing) const;
 
+  // Frames in the log after the last commit, told by SQLite's hook. On the
+  // heap, so that the hook's pointer survives a move. Destroyed last.
+  std::unique_ptr<int> log_frames_ = std::make_unique<int>(0);
   std::unique_ptr<sqlite3, Closer> database_;
 };
 

@@ -135,6 +135,12 @@ class ObstacleMap {
   // Ends the restoring; must be called, and last. Errors: DATA_LOSS (tiles
   // are missing or hang on none).
   absl::Status RestoreRevision(uint64_t revision, Time as_of);
+  // While a journal is replayed behind the restored pieces: makes the revision
+  // at least `revision`. Events that were refused took a revision and left no
+  // record; what comes after them must get the numbers it had.
+  void AdvanceRevision(uint64_t revision) {
+    if (revision_ < revision) revision_ = revision;
+  }
 
  private:
   struct OpenActivity {

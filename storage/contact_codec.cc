@@ -1,0 +1,197 @@
+#include "storage/contact_codec.h"
+
+#include <utility>
+#include <variant>
+
+#include "base/status_macros.h"
+#include "storage/blob.h"
+#include "storage/column.h"
+
+namespace fathom::storage {
+namespace {
+
+constexpr std::uint8_t kContactVersion = 1;
+constexpr std::uint8_t kEstimateVersion = 1;
+
+enum ReportFlag : std::uint8_t {
+  kIsFix = 1,
+  kHasDepth = 2,
+  kHasDepthStd = 4,
+  kInactive = 8,
+  kAllReportFlags = 15,
+};
+
+void PutPoint(const map::GeodeticPoint& point, ByteWriter& writer) {
+  writer.PutF64(point.latitude_deg);
+  writer.PutF64(point.longitude_deg);
+}
+
+map::GeodeticPoint GetPoint(ByteReader& reader) {
+  map::GeodeticPoint point;
+  point.latitude_deg = reader.GetF64();
+  point.longitude_deg = reader.GetF64();
+  return point;
+}
+
+map::ContactClass GetContactClass(ByteReader& reader) {
+  const auto contact_class = static_cast<map::ContactClass>(reader.GetU8());
+  if (!map::IsContactClass(contact_class)) reader.Fail();
+  return contact_class;
+}
+
+void PutContactPoint(const map::ContactPoint& point, ByteWriter& writer) {
+  writer.PutU8(static_cast<std::uint8_t>(point.contact_class));
+  writer.PutU8(static_cast<std::uint8_t>(point.status));
+  writer.PutTime(point.time);
+  writer.PutTime(point.report_time);
+  writer.PutTime(point.track_start);
+  PutPoint(point.frame_origin, writer);
+  for (int i = 0; i < 4; ++i) writer.PutF64(point.x(i));
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 4; ++j) writer.PutF64(point.P(i, j));
+  }
+  writer.PutF64(point.top_depth_m);
+  writer.PutF64(point.keel_depth_m);
+  writer.PutF64(point.depth_std_m);
+  writer.PutF64(point.radius_m);
+  writer.PutU64(point.report_count);
+}
+
+void GetContactPoint(ByteReader& reader, map::ContactPoint& point) {
+  point.contact_class = GetContactClass(reader);
+  const std::uint8_t status = reader.GetU8();
+  if (status < 1 || status > 4) reader.Fail();
+  point.status = static_cast<map::ContactStatus>(status);
+  point.time = reader.GetTime();
+  point.report_time = reader.GetTime();
+  point.track_start = reader.GetTime();
+  point.frame_origin = GetPoint(reader);
+  for (int i = 0; i < 4; ++i) point.x(i) = reader.GetF64();
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 4; ++j) point.P(i, j) = reader.GetF64();
+  }
+  point.top_depth_m = reader.GetF64();
+  point.keel_depth_m = reader.GetF64();
+  point.depth_std_m = reader.GetF64();
+  point.radius_m = reader.GetF64();
+  point.report_count = reader.GetU64();
+}
+
+}  // namespace
+
+void PutContactReport(const map::ContactReport& report, ByteWriter& writer) {
+  const auto* const fix = std::get_if<map::ContactFix>(&report.observation);
+  std::uint8_t flags = 0;
+  if (fix != nullptr) flags |= kIsFix;
+  if (report.depth_m.has_value()) flags |= kHasDepth;
+  if (report.depth_std_m.has_value()) flags |= kHasDepthStd;
+  if (report.inactive) flags |= kInactive;
+  writer.PutU8(flags);
+  writer.PutU8(static_cast<std::uint8_t>(report.contact_class));
+  writer.PutTime(report.time);
+  if (fix != nullptr) {
+    PutPoint(fix->position, writer);
+    writer.PutF64(fix->velocity_north_m_s);
+    writer.PutF64(fix->velocity_east_m_s);
+    writer.PutF64(fix->position_std_m);
+    writer.PutF64(fix->velocity_std_m_s);
+  } else {
+    const auto& polar = std::get<map::RangeBearing>(report.observation);
+    PutPoint(polar.pose.position, writer);
+    writer.PutF64(polar.pose.depth_m);
+    writer.PutF64(polar.pose.heading_deg);
+    writer.PutF64(polar.pose.position_std_m);
+    writer.PutF64(polar.range_m);
+    writer.PutF64(polar.bearing_deg);
+    writer.PutF64(polar.range_std_m);
+    writer.PutF64(polar.bearing_std_deg);
+  }
+  if (report.depth_m.has_value()) writer.PutF64(*report.depth_m);
+  if (report.depth_std_m.has_value()) writer.PutF64(*report.depth_std_m);
+}
+
+void GetContactReport(ByteReader& reader, map::ContactReport& report) {
+  const std::uint8_t flags = reader.GetU8();
+  if (flags > kAllReportFlags) reader.Fail();
+  report.contact_class = GetContactClass(reader);
+  report.time = reader.GetTime();
+  if ((flags & kIsFix) != 0) {
+    map::ContactFix fix;
+    fix.position = GetPoint(reader);
+    fix.velocity_north_m_s = reader.GetF64();
+    fix.velocity_east_m_s = reader.GetF64();
+    fix.position_std_m = reader.GetF64();
+    fix.velocity_std_m_s = reader.GetF64();
+    report.observation = fix;
+  } else {
+    map::RangeBearing polar;
+    polar.pose.position = GetPoint(reader);
+    polar.pose.depth_m = reader.GetF64();
+    polar.pose.heading_deg = reader.GetF64();
+    polar.pose.position_std_m = reader.GetF64();
+    polar.range_m = reader.GetF64();
+    polar.bearing_deg = reader.GetF64();
+    polar.range_std_m = reader.GetF64();
+    polar.bearing_std_deg = reader.GetF64();
+    report.observation = polar;
+  }
+  if ((flags & kHasDepth) != 0) report.depth_m = reader.GetF64();
+  if ((flags & kHasDepthStd) != 0) report.depth_std_m = reader.GetF64();
+  report.inactive = (flags & kInactive) != 0;
+}
+
+Bytes EncodeContactPoint(const map::ContactPoint& point) {
+  ByteWriter writer = StartBlob();
+  PutContactPoint(point, writer);
+  return SealBlob(BlobKind::kContactEstimate, kEstimateVersion,
+                  std::move(writer));
+}
+
+absl::StatusOr<map::ContactPoint> DecodeContactPoint(ByteSpan blob,
+                                                     std::string_view what) {
+  FATHOM_ASSIGN_OR_RETURN(
+      const ByteSpan payload,
+      OpenBlob(BlobKind::kContactEstimate, kEstimateVersion, blob, what));
+  ByteReader reader(payload);
+  map::ContactPoint point;
+  GetContactPoint(reader, point);
+  FATHOM_RETURN_IF_ERROR(reader.Finish(what));
+  return point;
+}
+
+Bytes EncodeContact(const map::StoredContact& contact) {
+  ByteWriter rows;
+  for (const map::ContactEstimate& estimate : contact.estimates) {
+    PutContactPoint(estimate, rows);
+  }
+  ByteWriter writer = StartBlob();
+  writer.PutString(contact.key.source.value);
+  writer.PutString(contact.key.contact.value);
+  writer.PutVarint(contact.estimates.size());
+  PutRows(rows.bytes(), kContactPointBytes, writer);
+  return SealBlob(BlobKind::kContact, kContactVersion, std::move(writer));
+}
+
+absl::StatusOr<map::StoredContact> DecodeContact(ByteSpan blob,
+                                                 std::string_view what) {
+  FATHOM_ASSIGN_OR_RETURN(
+      const ByteSpan payload,
+      OpenBlob(BlobKind::kContact, kContactVersion, blob, what));
+  ByteReader reader(payload);
+  map::StoredContact contact;
+  contact.key.source.value = reader.GetString();
+  contact.key.contact.value = reader.GetString();
+  const std::size_t count = reader.GetCount(map::kRecentEstimates);
+  const Bytes bytes = GetRows(reader, count, kContactPointBytes);
+  FATHOM_RETURN_IF_ERROR(reader.Finish(what));
+  ByteReader rows(bytes);
+  contact.estimates.resize(count);
+  for (map::ContactEstimate& estimate : contact.estimates) {
+    estimate.key = contact.key;
+    GetContactPoint(rows, estimate);
+  }
+  FATHOM_RETURN_IF_ERROR(rows.Finish(what));
+  return contact;
+}
+
+}  // namespace fathom::storage

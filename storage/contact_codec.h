@@ -1,0 +1,39 @@
+// Contacts as bytes: reports and drops (for the journal), estimates (for the
+// history), whole contacts (for the checkpoint). Lossless.
+// docs/storage_format.md has the layouts. Thread-safe.
+
+#ifndef FATHOM_STORAGE_CONTACT_CODEC_H_
+#define FATHOM_STORAGE_CONTACT_CODEC_H_
+
+#include <string_view>
+
+#include "absl/status/statusor.h"
+#include "map/contacts/contact.h"
+#include "map/contacts/contact_report.h"
+#include "storage/bytes.h"
+
+namespace fathom::storage {
+
+// Bytes of one ContactPoint: what a million of history rows cost.
+inline constexpr std::size_t kContactPointBytes = 242;
+
+// A report without its key (the caller writes ids from a table of its own).
+void PutContactReport(const map::ContactReport& report, ByteWriter& writer);
+// Leaves `key` as it is; fails the reader on what no encoder wrote.
+void GetContactReport(ByteReader& reader, map::ContactReport& report);
+
+// An estimate without its key.
+Bytes EncodeContactPoint(const map::ContactPoint& point);
+absl::StatusOr<map::ContactPoint> DecodeContactPoint(ByteSpan blob,
+                                                     std::string_view what);
+
+// A contact with its recent estimates.
+// REQUIRES: 1 to map::kRecentEstimates estimates.
+Bytes EncodeContact(const map::StoredContact& contact);
+// Errors: DATA_LOSS naming `what`; UNIMPLEMENTED for a newer version.
+absl::StatusOr<map::StoredContact> DecodeContact(ByteSpan blob,
+                                                 std::string_view what);
+
+}  // namespace fathom::storage
+
+#endif  // FATHOM_STORAGE_CONTACT_CODEC_H_

@@ -1,0 +1,175 @@
+#include "storage/loader.h"
+
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_format.h"
+#include "base/status_macros.h"
+#include "storage/activity_codec.h"
+#include "storage/contact_codec.h"
+#include "storage/journal_codec.h"
+#include "storage/schema.h"
+#include "storage/tile_codec.h"
+
+namespace fathom::storage {
+namespace {
+
+absl::Status LoadTiles(Connection& connection, Loaded& loaded) {
+  FATHOM_ASSIGN_OR_RETURN(
+      Statement select,
+      connection.Prepare(
+          "SELECT tile_key, content FROM tile ORDER BY tile_key"));
+  while (true) {
+    FATHOM_ASSIGN_OR_RETURN(const bool more, select.Step());
+    if (!more) return absl::OkStatus();
+    const map::TileKey key = map::TileKey::FromPacked(select.ColumnUint(0));
+    FATHOM_ASSIGN_OR_RETURN(map::TileContent content,
+                            DecodeTile(key, select.ColumnBlob(1)));
+    loaded.tiles.emplace_back(key, std::move(content));
+  }
+}
+
+absl::Status LoadBlocks(Connection& connection, std::uint32_t number,
+                        LoadedActivity& activity) {
+  FATHOM_ASSIGN_OR_RETURN(
+      Statement select,
+      connection.Prepare("SELECT block_key, content FROM local_block WHERE "
+                         "block_key >= ? AND block_key < ? ORDER BY "
+                         "block_key"));
+  select.BindUint(0, BlockKey{number, {}}.Packed());
+  select.BindUint(1, BlockKey{number + 1, {}}.Packed());
+  while (true) {
+    FATHOM_ASSIGN_OR_RETURN(const bool more, select.Step());
+    if (!more) return absl::OkStatus();
+    const BlockKey key = BlockKey::FromPacked(select.ColumnUint(0));
+    FATHOM_ASSIGN_OR_RETURN(map::LocalBlock block,
+                            DecodeBlock(key, select.ColumnBlob(1)));
+    activity.blocks.emplace_back(key.index, std::move(block));
+  }
+}
+
+absl::Status LoadActivities(Connection& connection, Loaded& loaded) {
+  FATHOM_ASSIGN_OR_RETURN(
+      Statement select,
+      connection.Prepare("SELECT activity_number, activity_id, content FROM "
+                         "activity ORDER BY activity_number"));
+  while (true) {
+    FATHOM_ASSIGN_OR_RETURN(const bool more, select.Step());
+    if (!more) return absl::OkStatus();
+    const std::int64_t number = select.ColumnInt(0);
+    const std::string id = select.ColumnText(1);
+    const std::string what = absl::StrFormat("activity_id=%s", id);
+    LoadedActivity activity;
+    FATHOM_ASSIGN_OR_RETURN(activity.activity,
+                            DecodeActivity(select.ColumnBlob(2), what));
+    if (activity.activity.start.id.value != id) {
+      return absl::DataLossError(what + ": holds another activity");
+    }
+    if (activity.activity.open) {
+      FATHOM_RETURN_IF_ERROR(
+          LoadBlocks(connection, static_cast<std::uint32_t>(number), activity));
+    }
+    loaded.activities.push_back(std::move(activity));
+  }
+}
+
+absl::Status LoadContacts(Connection& connection, Loaded& loaded) {
+  FATHOM_ASSIGN_OR_RETURN(
+      Statement select,
+      connection.Prepare("SELECT source_id, contact_id, content FROM contact "
+                         "WHERE content IS NOT NULL ORDER BY source_id, "
+                         "contact_id"));
+  while (true) {
+    FATHOM_ASSIGN_OR_RETURN(const bool more, select.Step());
+    if (!more) return absl::OkStatus();
+    const map::ContactKey key{.source = {select.ColumnText(0)},
+                              .contact = {select.ColumnText(1)}};
+    const std::string what =
+        absl::StrFormat("contact source_id=%s contact_id=%s", key.source.value,
+                        key.contact.value);
+    FATHOM_ASSIGN_OR_RETURN(map::StoredContact contact,
+                            DecodeContact(select.ColumnBlob(2), what));
+    if (contact.key != key) {
+      return absl::DataLossError(what + ": holds another contact");
+    }
+    loaded.contacts.push_back(std::move(contact));
+  }
+}
+
+absl::Status LoadCheckpointMark(Connection& connection, Loaded& loaded) {
+  FATHOM_ASSIGN_OR_RETURN(
+      Statement select,
+      connection.Prepare(
+          "SELECT checkpoint_revision, checkpoint_as_of_us FROM mission"));
+  FATHOM_ASSIGN_OR_RETURN(const bool row, select.Step());
+  if (!row) return absl::DataLossError("the mission table is empty");
+  loaded.checkpoint_revision = select.ColumnUint(0);
+  loaded.checkpoint_as_of = TimeFromUnixMicros(select.ColumnInt(1));
+  return absl::OkStatus();
+}
+
+absl::Status LoadJournal(Connection& connection, Loaded& loaded) {
+  FATHOM_ASSIGN_OR_RETURN(
+      Statement select,
+      connection.Prepare("SELECT segment_id, record_count, content FROM "
+                         "journal ORDER BY segment_id"));
+  loaded.revision = loaded.checkpoint_revision;
+  while (true) {
+    FATHOM_ASSIGN_OR_RETURN(const bool more, select.Step());
+    if (!more) return absl::OkStatus();
+    const std::string what =
+        absl::StrFormat("journal segment_id=%d", select.ColumnInt(0));
+    std::vector<JournalRecord> records;
+    FATHOM_RETURN_IF_ERROR(DecodeJournal(select.ColumnBlob(2), what, records));
+    if (records.size() != select.ColumnUint(1)) {
+      return absl::DataLossError(
+          absl::StrFormat("%s: %d records, its row says %d", what,
+                          records.size(), select.ColumnUint(1)));
+    }
+    for (JournalRecord& record : records) {
+      // A segment may reach back behind the checkpoint.
+      if (record.revision <= loaded.checkpoint_revision) continue;
+      if (record.revision < loaded.revision) {
+        return absl::DataLossError(
+            absl::StrFormat("%s: revision %d comes after %d", what,
+                            record.revision, loaded.revision));
+      }
+      loaded.revision = record.revision;
+      loaded.journal.push_back(std::move(record));
+    }
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<std::vector<SourcePosition>> LoadSourcePositions(
+    Connection& connection) {
+  FATHOM_ASSIGN_OR_RETURN(
+      Statement select,
+      connection.Prepare("SELECT stream, source_id, epoch, sequence FROM "
+                         "source_position ORDER BY stream, source_id"));
+  std::vector<SourcePosition> positions;
+  while (true) {
+    FATHOM_ASSIGN_OR_RETURN(const bool more, select.Step());
+    if (!more) return positions;
+    positions.push_back({.stream = static_cast<StreamKind>(select.ColumnInt(0)),
+                         .source = {select.ColumnText(1)},
+                         .epoch = select.ColumnUint(2),
+                         .sequence = select.ColumnUint(3)});
+  }
+}
+
+absl::StatusOr<Loaded> LoadMission(Connection& connection) {
+  Loaded loaded;
+  FATHOM_ASSIGN_OR_RETURN(loaded.metadata, ReadMetadata(connection));
+  FATHOM_RETURN_IF_ERROR(LoadCheckpointMark(connection, loaded));
+  FATHOM_RETURN_IF_ERROR(LoadTiles(connection, loaded));
+  FATHOM_RETURN_IF_ERROR(LoadActivities(connection, loaded));
+  FATHOM_RETURN_IF_ERROR(LoadContacts(connection, loaded));
+  FATHOM_ASSIGN_OR_RETURN(loaded.source_positions,
+                          LoadSourcePositions(connection));
+  FATHOM_RETURN_IF_ERROR(LoadJournal(connection, loaded));
+  return loaded;
+}
+
+}  // namespace fathom::storage

@@ -1,0 +1,22 @@
+// Reads a whole mission back: see MissionFile::Load.
+
+#ifndef FATHOM_STORAGE_LOADER_H_
+#define FATHOM_STORAGE_LOADER_H_
+
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "storage/mission_records.h"
+#include "storage/sqlite.h"
+
+namespace fathom::storage {
+
+// Errors: DATA_LOSS naming the row whose blob is damaged; those of sqlite.h.
+absl::StatusOr<Loaded> LoadMission(Connection& connection);
+
+absl::StatusOr<std::vector<SourcePosition>> LoadSourcePositions(
+    Connection& connection);
+
+}  // namespace fathom::storage
+
+#endif  // FATHOM_STORAGE_LOADER_H_

@@ -1,0 +1,173 @@
+#include "storage/tile_codec.h"
+
+#include <array>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_format.h"
+#include "base/status_macros.h"
+#include "storage/blob.h"
+#include "storage/column.h"
+
+namespace fathom::storage {
+namespace {
+
+constexpr std::uint8_t kTileVersion = 1;
+constexpr std::uint8_t kBlockVersion = 1;
+
+enum BlockFlag : std::uint8_t {
+  kHasTransferred = 1,
+  kHasPriorGrid = 2,
+  kHasNervegna = 4,
+  kAllBlockFlags = 7,
+};
+
+// One bit per cell, cell k in bit k % 8 of byte k / 8.
+using CellMask = std::array<std::uint8_t, map::kBlockCells / 8>;
+
+bool IsSet(const CellMask& mask, std::size_t k) {
+  return ((mask[k / 8] >> (k % 8)) & 1) != 0;
+}
+
+// The cells that differ from an untouched one, and only those: a swath covers
+// the blocks at its border thinly.
+void PutEvidence(std::span<const map::Evidence> cells, ByteWriter& writer) {
+  const map::Evidence untouched;
+  CellMask mask = {};
+  std::vector<map::Evidence> touched;
+  for (std::size_t k = 0; k < map::kBlockCells; ++k) {
+    // Compared as bits: shoalest_m is NaN in the untouched.
+    if (std::memcmp(&cells[k], &untouched, sizeof(untouched)) == 0) continue;
+    mask[k / 8] |= static_cast<std::uint8_t>(1u << (k % 8));
+    touched.push_back(cells[k]);
+  }
+  writer.PutBytes(mask);
+  PutColumnBytes(touched.data(), touched.size(), sizeof(map::Evidence), writer);
+}
+
+void GetEvidence(ByteReader& reader, std::span<map::Evidence> cells) {
+  CellMask mask = {};
+  const ByteSpan stored = reader.GetBytes(mask.size());
+  std::copy(stored.begin(), stored.end(), mask.begin());
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < map::kBlockCells; ++k) count += IsSet(mask, k);
+  std::vector<map::Evidence> touched(count);
+  GetColumnBytes(reader, count, sizeof(map::Evidence), touched.data());
+  if (!reader.ok()) return;
+  auto next = touched.begin();
+  for (std::size_t k = 0; k < map::kBlockCells; ++k) {
+    if (IsSet(mask, k)) cells[k] = *next++;
+  }
+}
+
+// The numbers are those of map::EvidenceKind; it knows five.
+void CheckKind(map::EvidenceKind kind, ByteReader& reader) {
+  if (static_cast<std::uint8_t>(kind) > 4) reader.Fail();
+}
+
+}  // namespace
+
+Bytes EncodeTile(const map::TileKey& key, const map::TileContent& content) {
+  ByteWriter writer = StartBlob();
+  writer.PutU64(key.Packed());
+  writer.PutVarint(content.levels.size());
+  writer.PutBool(!content.residual_codes.empty());
+  PutColumn(content.levels, writer);
+  PutColumn(content.depths_m, writer);
+  PutColumn(content.std_codes, writer);
+  PutColumn(content.times_s, writer);
+  PutColumn(content.residual_codes, writer);
+  return SealBlob(BlobKind::kTile, kTileVersion, std::move(writer));
+}
+
+absl::StatusOr<map::TileContent> DecodeTile(const map::TileKey& key,
+                                            ByteSpan blob) {
+  const std::string what = absl::StrFormat("tile level=%d row=%d col=%d",
+                                           key.level, key.row, key.col);
+  FATHOM_ASSIGN_OR_RETURN(const ByteSpan payload,
+                          OpenBlob(BlobKind::kTile, kTileVersion, blob, what));
+  ByteReader reader(payload);
+  if (reader.GetU64() != key.Packed()) {
+    return absl::DataLossError(what + ": holds the bytes of another tile");
+  }
+  const std::size_t count = reader.GetCount(map::kTileCells);
+  const bool has_residuals = reader.GetBool();
+  map::TileContent content;
+  content.levels = GetColumn<std::uint8_t>(reader, count);
+  content.depths_m = GetColumn<float>(reader, count);
+  content.std_codes = GetColumn<std::uint16_t>(reader, count);
+  content.times_s = GetColumn<std::uint32_t>(reader, count);
+  if (has_residuals) {
+    content.residual_codes = GetColumn<std::uint8_t>(reader, count);
+  }
+  FATHOM_RETURN_IF_ERROR(reader.Finish(what));
+  return content;
+}
+
+Bytes EncodeBlock(const BlockKey& key, const map::LocalBlock& block) {
+  ByteWriter writer = StartBlob();
+  writer.PutU64(key.Packed());
+  std::uint8_t flags = 0;
+  if (!block.transferred.empty()) flags |= kHasTransferred;
+  if (block.prior_grid != nullptr) flags |= kHasPriorGrid;
+  if (!block.nervegna.empty()) flags |= kHasNervegna;
+  writer.PutU8(flags);
+  writer.PutF32(block.uniform_prior.depth_m);
+  writer.PutF32(block.uniform_prior.std_m);
+  writer.PutU8(static_cast<std::uint8_t>(block.uniform_prior.kind));
+  PutEvidence(block.evidence, writer);
+  if (!block.transferred.empty()) PutEvidence(block.transferred, writer);
+  if (block.prior_grid != nullptr) {
+    PutColumn(std::span<const float>(block.prior_grid->depth_m), writer);
+    PutColumn(std::span<const float>(block.prior_grid->std_m), writer);
+    static_assert(sizeof(map::EvidenceKind) == 1);
+    PutColumnBytes(block.prior_grid->kind.data(), map::kBlockCells, 1, writer);
+  }
+  static_assert(sizeof(map::NervegnaCell) == 8);
+  PutColumnBytes(block.nervegna.data(), block.nervegna.size(), 8, writer);
+  return SealBlob(BlobKind::kLocalBlock, kBlockVersion, std::move(writer));
+}
+
+absl::StatusOr<map::LocalBlock> DecodeBlock(const BlockKey& key,
+                                            ByteSpan blob) {
+  const std::string what =
+      absl::StrFormat("local block activity_number=%d row=%d col=%d",
+                      key.activity_number, key.index.row, key.index.col);
+  FATHOM_ASSIGN_OR_RETURN(
+      const ByteSpan payload,
+      OpenBlob(BlobKind::kLocalBlock, kBlockVersion, blob, what));
+  ByteReader reader(payload);
+  if (reader.GetU64() != key.Packed()) {
+    return absl::DataLossError(what + ": holds the bytes of another block");
+  }
+  const std::uint8_t flags = reader.GetU8();
+  if (flags > kAllBlockFlags) reader.Fail();
+  map::LocalBlock block;
+  block.uniform_prior.depth_m = reader.GetF32();
+  block.uniform_prior.std_m = reader.GetF32();
+  block.uniform_prior.kind = static_cast<map::EvidenceKind>(reader.GetU8());
+  CheckKind(block.uniform_prior.kind, reader);
+  GetEvidence(reader, block.evidence);
+  if ((flags & kHasTransferred) != 0) {
+    block.transferred.resize(map::kBlockCells);
+    GetEvidence(reader, block.transferred);
+  }
+  if ((flags & kHasPriorGrid) != 0) {
+    auto grid = std::make_shared<map::PriorGrid>();
+    GetColumnBytes(reader, map::kBlockCells, 4, grid->depth_m.data());
+    GetColumnBytes(reader, map::kBlockCells, 4, grid->std_m.data());
+    GetColumnBytes(reader, map::kBlockCells, 1, grid->kind.data());
+    for (const map::EvidenceKind kind : grid->kind) CheckKind(kind, reader);
+    block.prior_grid = std::move(grid);
+  }
+  if ((flags & kHasNervegna) != 0) {
+    block.nervegna.resize(map::kBlockCells);
+    GetColumnBytes(reader, map::kBlockCells, 8, block.nervegna.data());
+  }
+  FATHOM_RETURN_IF_ERROR(reader.Finish(what));
+  return block;
+}
+
+}  // namespace fathom::storage
