@@ -21,7 +21,7 @@ inline constexpr std::uint64_t kMaxLocalCells = 100'000'000;
 inline constexpr std::uint32_t kMaxLocalSideCells = 65'536;
 
 // The farthest that smoothing may reach, in cells: a reading then looks at
-// (2 * 16 + 1)^2 = 1089 cells, some 10 us.
+// (2 * 16 + 1)^2 = 1089 cells, some 50 us.
 inline constexpr std::uint32_t kMaxSmoothReach = 16;
 
 // Depths outside are sentinels or gross errors: no sea is deeper than 11 km;

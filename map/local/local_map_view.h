@@ -104,7 +104,8 @@ class LocalMapView {
       const LocalMapView& old_view, const LocalMapView& now,
       const std::function<void(BlockIndex, const LocalBlock&)>& visit);
 
-  LocalMapView(std::shared_ptr<const LocalGrid> grid, BlockDirectory directory);
+  LocalMapView(std::shared_ptr<const LocalGrid> grid,
+               std::shared_ptr<const BlockDirectory> directory);
 
   std::shared_ptr<const LocalGrid> grid_;
   std::shared_ptr<const BlockDirectory> directory_;

@@ -1,0 +1,98 @@
+// The default estimator: how certain is the depth in a cell, really?
+//
+// Model (random effects): inside a cell the depth varies as N(mu, tau^2) and a
+// sounding of stated variance s^2 reads z ~ N(mu, s^2 + tau^2). The map
+// reports the predictive std, that of the depth at a place in the cell:
+//
+//   std^2 = variance of the mean + tau^2
+//
+// The mean is the weighted mean of the soundings (weights 1 / s^2), so pings
+// that agree reach sigma / sqrt(n); its variance is 1 / W + tau^2 / n.
+//
+// tau^2 comes from three witnesses, weighed by their degrees of freedom:
+//   - the cell's own scatter in excess of the stated noise (DerSimonian and
+//     Laird 1986, doi:10.1016/0197-2456(86)90046-2, with equal weights);
+//   - the depth steps to the measured neighbours: a plane that steps g_n and
+//     g_e per cell varies by (g_n^2 + g_e^2) / 12 inside one;
+//   - the excess scatter of those neighbours.
+// A weak last word has kTypicalSlope, so that nothing is ever certain to 0.
+// Where the own scatter is beyond chance the regional witnesses may raise
+// tau^2 but no longer lower it: soundings that disagree leave a std not below
+// their spread.
+//
+// The prior is fused by 4.18 and 4.20, but a prior that the evidence
+// contradicts is widened to the contradiction first (see FusePrior).
+//
+// The constants are chosen for sense, checked by Monte Carlo in
+// tests/map/local/adaptive_test.cc, and not yet fitted to survey data. All
+// functions are pure and thread-safe; about 50 ns with eight neighbours.
+
+#ifndef FATHOM_MAP_LOCAL_ADAPTIVE_H_
+#define FATHOM_MAP_LOCAL_ADAPTIVE_H_
+
+#include <array>
+#include <cstddef>
+
+#include "map/local/evidence.h"
+#include "map/local/local_block.h"
+
+namespace fathom::map {
+
+// A mean and its variance; metres and m^2.
+struct MeanVariance {
+  double mean_m = 0.0;
+  double variance_m2 = 0.0;
+};
+
+// Depth change per metre that is assumed where no neighbour tells: 0.03 (1.7
+// degrees), the order of shelf and estuary floors.
+inline constexpr double kTypicalSlope = 0.03;
+
+// A cell and its eight neighbours, three rows from south to north of three
+// from west to east; index 4 is the cell itself. Null: never measured (or
+// outside the map).
+using Neighbourhood = std::array<const Evidence*, 9>;
+inline constexpr std::size_t kCenter = 4;
+
+// What the surroundings say about the variability inside a cell.
+struct RegionalVariability {
+  double variance_m2 = 0.0;         // Their estimate of tau^2, > 0.
+  double degrees_of_freedom = 0.0;  // How much it counts, > 0.
+};
+
+// From the steps between the measured cells of the neighbourhood (the centre
+// included) and the neighbours' excess scatter.
+RegionalVariability VariabilityAround(const Neighbourhood& cells,
+                                      double cell_size_m);
+
+// tau^2 of a cell with this evidence. REQUIRES: !evidence.empty().
+double VariabilityInside(const Evidence& evidence,
+                         const RegionalVariability& around);
+
+// Variance of the evidence's weighted mean: 1 / W + tau^2 / n.
+double MeanVarianceOf(const Evidence& evidence, double variability_m2);
+
+// The mean of `evidence` (variance `variance_m2` about the cell's mean)
+// together with the prior. `soundings` is how many made it.
+//
+// Let d be their distance. If d^2 is within what both variances explain, this
+// is 4.18 + 4.20. Else the prior's variance is widened to what would explain
+// d (its maximum-likelihood value d^2 - variance), which continues the former
+// without a step: the farther off the prior, the less it pulls. A prior 15 m
+// wrong then pulls two soundings of 0.5 m by 8 mm. A single sounding that
+// contradicts the prior beyond 3 sigma may itself be the error, so the
+// variance of "either one" (k (1 - k) d^2 with the unwidened k) is added until
+// a second one has come.
+// An infinite prior_variance_m2 means no prior.
+MeanVariance FusePrior(const MeanVariance& evidence, std::uint32_t soundings,
+                       double prior_mean_m, double prior_variance_m2);
+
+// The whole reading of a measured cell: mean and predictive variance. A prior
+// of kind kNone or kLand is left out. REQUIRES: cells[kCenter] not null and
+// not empty.
+MeanVariance ReadAdaptive(const Neighbourhood& cells, const CellPrior& prior,
+                          double cell_size_m);
+
+}  // namespace fathom::map
+
+#endif  // FATHOM_MAP_LOCAL_ADAPTIVE_H_

@@ -1,0 +1,342 @@
+#include "map/local/local_map.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include "absl/strings/str_format.h"
+#include "base/time.h"
+#include "map/local/block_directory.h"
+#include "map/local/estimator.h"
+#include "map/local/local_grid.h"
+#include "map/local/placement.h"
+
+namespace fathom::map {
+namespace {
+
+constexpr double kRadPerDeg = std::numbers::pi / 180.0;
+
+std::uint32_t ToUnixSeconds(Time time) {
+  const std::int64_t seconds =
+      std::chrono::floor<std::chrono::seconds>(time).time_since_epoch().count();
+  return static_cast<std::uint32_t>(std::clamp<std::int64_t>(
+      seconds, 0, std::numeric_limits<std::uint32_t>::max()));
+}
+
+bool IsFinite(const Pose& pose) {
+  return std::isfinite(pose.position.latitude_deg) &&
+         std::isfinite(pose.position.longitude_deg) &&
+         std::isfinite(pose.depth_m) && std::isfinite(pose.heading_deg) &&
+         std::isfinite(pose.position_std_m);
+}
+
+bool IsFinite(const Beam& beam) {
+  return std::isfinite(beam.range_m) && std::isfinite(beam.bearing_rad) &&
+         std::isfinite(beam.depth_m) && std::isfinite(beam.std_m);
+}
+
+// 4.3.3.1 and domain section 4: the reason to refuse a beam, place aside.
+std::optional<RejectReason> Threshold(const Beam& beam,
+                                      const LocalMapOptions& options) {
+  if (!IsFinite(beam)) return RejectReason::kNotFinite;
+  if (beam.range_m <= options.min_range_m) return RejectReason::kBelowMinRange;
+  if (beam.range_m >= options.max_range_m) return RejectReason::kAboveMaxRange;
+  if (beam.std_m <= 0.0f || beam.std_m > kMaxStdM) return RejectReason::kBadStd;
+  if (beam.depth_m < kMinDepthM || beam.depth_m > kMaxDepthM) {
+    return RejectReason::kBadDepth;
+  }
+  return std::nullopt;
+}
+
+// A prior that may stand in the map: known, finite, a std above 0.
+CellPrior ToCellPrior(const std::optional<DepthEstimate>& estimate) {
+  if (!estimate.has_value() || estimate->kind == EvidenceKind::kNone) return {};
+  if (estimate->kind == EvidenceKind::kLand) {
+    return {.kind = EvidenceKind::kLand};
+  }
+  if (!std::isfinite(estimate->depth_m) || !std::isfinite(estimate->std_m) ||
+      estimate->std_m <= 0.0f) {
+    return {};
+  }
+  return {.depth_m = estimate->depth_m,
+          .std_m = std::max(estimate->std_m, kMinStdM),
+          .kind = estimate->kind};
+}
+
+bool HasDepth(const CellPrior& prior) {
+  return prior.kind != EvidenceKind::kNone && prior.kind != EvidenceKind::kLand;
+}
+
+NervegnaCell StartOf(const CellPrior& prior) {
+  if (!HasDepth(prior)) {
+    return {.mean_m = 0.0f,
+            .variance_m2 = std::numeric_limits<float>::infinity()};
+  }
+  return {.mean_m = prior.depth_m, .variance_m2 = prior.std_m * prior.std_m};
+}
+
+// 4.18 + 4.21 with gain k. A cell of which nothing is known takes the new
+// value with `first_variance_m2`.
+void FuseNervegna(double k, double mean_m, double first_variance_m2,
+                  NervegnaCell& cell) {
+  if (std::isinf(cell.variance_m2)) {
+    cell.mean_m = static_cast<float>(mean_m);
+    cell.variance_m2 = static_cast<float>(first_variance_m2);
+    return;
+  }
+  cell.variance_m2 = static_cast<float>(
+      FuseVarianceNervegna(k, cell.variance_m2, cell.mean_m, mean_m));
+  cell.mean_m = static_cast<float>(CorrectMean(k, cell.mean_m, mean_m));
+}
+
+std::int64_t CountMeasuredCells(const LocalBlock& block) {
+  std::int64_t count = 0;
+  for (std::size_t k = 0; k < kBlockCells; ++k) count += block.measured(k);
+  return count;
+}
+
+}  // namespace
+
+struct LocalMap::State {
+  explicit State(const LocalMapOptions& options)
+      : grid(std::make_shared<const LocalGrid>(options)),
+        directory(std::make_shared<BlockDirectory>(grid->blocks_north,
+                                                   grid->blocks_east)) {}
+
+  // The directory, copied if a view may see it.
+  BlockDirectory& MutableDirectory() {
+    if (directory->epoch() != epoch) {
+      directory = std::make_shared<BlockDirectory>(*directory);
+      directory->set_epoch(epoch);
+    }
+    return *directory;
+  }
+
+  LocalBlock& MutableBlock(BlockIndex index, const PriorSource& prior);
+  void FillPrior(BlockIndex index, const PriorSource& prior,
+                 LocalBlock& block) const;
+  void AddSounding(CellIndex cell, const Beam& beam, std::uint32_t time_s,
+                   const PriorSource& prior);
+  void Smooth(CellIndex cell, const NervegnaCell& updated, std::uint32_t time_s,
+              const PriorSource& prior);
+
+  std::shared_ptr<const LocalGrid> grid;
+  std::shared_ptr<BlockDirectory> directory;
+  // Raised by each View(); see block_directory.h.
+  std::uint64_t epoch = 0;
+};
+
+void LocalMap::State::FillPrior(BlockIndex index, const PriorSource& prior,
+                                LocalBlock& block) const {
+  const LocalMapOptions& options = grid->options;
+  CellPrior fallback;
+  if (options.default_depth_m.has_value()) {
+    fallback = {.depth_m = *options.default_depth_m,
+                .std_m = *options.default_std_m,
+                .kind = EvidenceKind::kPrior};
+  }
+  block.uniform_prior = fallback;
+  if (prior) {
+    auto cells = std::make_shared<PriorGrid>();
+    bool uniform = true;
+    CellPrior first;
+    for (std::size_t k = 0; k < kBlockCells; ++k) {
+      const CellIndex cell = {.i = static_cast<std::int32_t>(
+                                  index.row * kBlockSide + k / kBlockSide),
+                              .j = static_cast<std::int32_t>(
+                                  index.col * kBlockSide + k % kBlockSide)};
+      CellPrior here = ToCellPrior(prior(grid->Center(cell)));
+      if (here.kind == EvidenceKind::kNone) here = fallback;
+      cells->depth_m[k] = here.depth_m;
+      cells->std_m[k] = here.std_m;
+      cells->kind[k] = here.kind;
+      if (k == 0) first = here;
+      uniform = uniform && here == first;
+    }
+    block.uniform_prior = first;
+    if (!uniform) block.prior_grid = std::move(cells);
+  }
+  if (options.estimator == EstimatorKind::kNervegna) {
+    block.nervegna.resize(kBlockCells);
+    for (std::size_t k = 0; k < kBlockCells; ++k) {
+      block.nervegna[k] = StartOf(block.prior(k));
+    }
+  }
+}
+
+LocalBlock& LocalMap::State::MutableBlock(BlockIndex index,
+                                          const PriorSource& prior) {
+  bool created = false;
+  BlockDirectory& mine = MutableDirectory();
+  LocalBlock& block = mine.Mutable(index, epoch, created);
+  if (created) {
+    FillPrior(index, prior, block);
+    mine.CountArrays(block, +1);
+  }
+  return block;
+}
+
+void LocalMap::State::AddSounding(CellIndex cell, const Beam& beam,
+                                  std::uint32_t time_s,
+                                  const PriorSource& prior) {
+  LocalBlock& block = MutableBlock(LocalGrid::BlockOf(cell), prior);
+  const std::size_t k = LocalGrid::OffsetOf(cell);
+  Evidence& evidence = block.evidence[k];
+  evidence.Add(beam.depth_m, beam.std_m, time_s);
+  if ((evidence.flags & kDirectlyUpdated) == 0) {
+    evidence.flags |= kDirectlyUpdated;
+    directory->CountMeasured(+1);
+  }
+  if (grid->options.estimator != EstimatorKind::kNervegna) return;
+
+  NervegnaCell& estimate = block.nervegna[k];
+  const double std_m = std::max(beam.std_m, kMinStdM);
+  const double variance_m2 = std_m * std_m;
+  FuseNervegna(Gain(estimate.variance_m2, variance_m2), beam.depth_m,
+               variance_m2, estimate);
+  if (grid->reach > 0) Smooth(cell, estimate, time_s, prior);
+}
+
+// Eqs. 4.22 to 4.25, block by block so that each is looked up once.
+void LocalMap::State::Smooth(CellIndex cell, const NervegnaCell& updated,
+                             std::uint32_t time_s, const PriorSource& prior) {
+  const NeighbourBounds bounds =
+      SmoothBounds(cell, grid->reach, grid->cells_north, grid->cells_east);
+  const double scale = grid->options.smoothing_scale;
+  constexpr std::int32_t kSide = static_cast<std::int32_t>(kBlockSide);
+  for (std::int32_t south = bounds.south; south <= bounds.north;) {
+    const std::int32_t next_south = (south / kSide + 1) * kSide;
+    const std::int32_t north = std::min(bounds.north, next_south - 1);
+    for (std::int32_t west = bounds.west; west <= bounds.east;) {
+      const std::int32_t next_west = (west / kSide + 1) * kSide;
+      const std::int32_t east = std::min(bounds.east, next_west - 1);
+      LocalBlock& block =
+          MutableBlock(LocalGrid::BlockOf({.i = south, .j = west}), prior);
+      for (std::int32_t i = south; i <= north; ++i) {
+        for (std::int32_t j = west; j <= east; ++j) {
+          const CellIndex near = {.i = i, .j = j};
+          const std::size_t k = LocalGrid::OffsetOf(near);
+          Evidence& evidence = block.evidence[k];
+          if ((evidence.flags & kDirectlyUpdated) != 0) continue;
+          NervegnaCell& estimate = block.nervegna[k];
+          const std::uint32_t apart = CellsApart(near, cell);
+          FuseNervegna(SmoothGain(scale, estimate.variance_m2,
+                                  updated.variance_m2, apart),
+                       updated.mean_m, double{updated.variance_m2} + apart,
+                       estimate);
+          evidence.flags |= kSmoothUpdated;
+          evidence.time_s = std::max(evidence.time_s, time_s);
+        }
+      }
+      west = next_west;
+    }
+    south = next_south;
+  }
+}
+
+absl::StatusOr<LocalMap> LocalMap::Create(const LocalMapOptions& options) {
+  const absl::Status valid = ValidateLocalMapOptions(options);
+  if (!valid.ok()) return valid;
+  return LocalMap(std::make_unique<State>(options));
+}
+
+LocalMap::LocalMap(std::unique_ptr<State> state) : state_(std::move(state)) {}
+LocalMap::LocalMap(LocalMap&&) noexcept = default;
+LocalMap& LocalMap::operator=(LocalMap&&) noexcept = default;
+LocalMap::~LocalMap() = default;
+
+LocalMap::UpdateResult LocalMap::Update(const Ping& ping,
+                                        const PriorSource& prior) {
+  UpdateResult result;
+  if (!IsFinite(ping.pose)) {
+    result.rejects.Add(RejectReason::kNotFinite, ping.beams.size());
+    return result;
+  }
+  const LocalGrid& grid = *state_->grid;
+  const NedPoint vehicle = grid.frame.ToNed(ping.pose.position);
+  const double heading_rad =
+      std::remainder(ping.pose.heading_deg, 360.0) * kRadPerDeg +
+      grid.frame.NorthAzimuthRad(ping.pose.position);
+  const std::uint32_t time_s = ToUnixSeconds(ping.time);
+  for (const Beam& beam : ping.beams) {
+    if (const std::optional<RejectReason> bad = Threshold(beam, grid.options)) {
+      result.rejects.Add(*bad);
+      continue;
+    }
+    const NedPoint obstacle = ObstaclePosition(
+        vehicle, BeamOffset(beam.range_m,
+                            BeamAzimuthRad(heading_rad, beam.bearing_rad)));
+    const std::optional<CellIndex> cell =
+        grid.Locate(obstacle.north_m, obstacle.east_m);
+    if (!cell.has_value()) {
+      result.rejects.Add(RejectReason::kOutsideArea);
+      continue;
+    }
+    state_->AddSounding(*cell, beam, time_s, prior);
+    ++result.accepted;
+  }
+  return result;
+}
+
+void LocalMap::MarkTransferred() {
+  const LocalMapView before = View();
+  before.ForEachBlock([this](BlockIndex index, const LocalBlock& seen) {
+    const bool any =
+        std::any_of(seen.evidence.begin(), seen.evidence.end(),
+                    [](const Evidence& cell) { return !cell.empty(); });
+    if (!any) return;
+    LocalBlock& block = state_->MutableBlock(index, nullptr);
+    state_->directory->CountArrays(block, -1);
+    block.transferred.resize(kBlockCells);
+    for (std::size_t k = 0; k < kBlockCells; ++k) {
+      block.transferred[k].Merge(block.evidence[k]);
+      // The flags stay: the cell was measured, wherever its evidence lies.
+      const std::uint16_t flags = block.evidence[k].flags;
+      block.evidence[k] = Evidence{};
+      block.evidence[k].flags = flags;
+    }
+    state_->directory->CountArrays(block, +1);
+  });
+}
+
+absl::Status LocalMap::RestoreBlock(BlockIndex index, LocalBlock block) {
+  const LocalGrid& grid = *state_->grid;
+  if (!grid.Contains(index)) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("block row=%u col=%u must be below %u, %u", index.row,
+                        index.col, grid.blocks_north, grid.blocks_east));
+  }
+  const std::size_t nervegna_cells =
+      grid.options.estimator == EstimatorKind::kNervegna ? kBlockCells : 0;
+  if (block.nervegna.size() != nervegna_cells) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "block row=%u col=%u: nervegna cells=%u must be %u", index.row,
+        index.col, block.nervegna.size(), nervegna_cells));
+  }
+  if (!block.transferred.empty() && block.transferred.size() != kBlockCells) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "block row=%u col=%u: transferred cells=%u must be 0 or 256", index.row,
+        index.col, block.transferred.size()));
+  }
+  BlockDirectory& mine = state_->MutableDirectory();
+  bool created = false;
+  LocalBlock& here = mine.Mutable(index, state_->epoch, created);
+  mine.CountMeasured(CountMeasuredCells(block) - CountMeasuredCells(here));
+  mine.CountArrays(here, -1);
+  mine.CountArrays(block, +1);
+  here = std::move(block);
+  return absl::OkStatus();
+}
+
+LocalMapView LocalMap::View() {
+  ++state_->epoch;
+  return LocalMapView(state_->grid, state_->directory);
+}
+
+const LocalMapOptions& LocalMap::options() const {
+  return state_->grid->options;
+}
+
+}  // namespace fathom::map

@@ -1,0 +1,292 @@
+#include "map/local/local_map_view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "absl/base/macros.h"
+#include "map/local/adaptive.h"
+#include "map/local/block_directory.h"
+#include "map/local/local_grid.h"
+#include "map/local/smoothed_reading.h"
+
+namespace fathom::map {
+namespace {
+
+// Where a cell lies in the tree; block null when never touched.
+struct Place {
+  const LocalBlock* block = nullptr;
+  std::size_t k = 0;
+};
+
+Place PlaceOf(const BlockDirectory& directory, CellIndex cell) {
+  return {.block = directory.Find(LocalGrid::BlockOf(cell)),
+          .k = LocalGrid::OffsetOf(cell)};
+}
+
+// Points at the evidence of a cell and its neighbours. `merged` holds those
+// of which a part was transferred.
+Neighbourhood Around(const LocalGrid& grid, const BlockDirectory& directory,
+                     CellIndex cell, std::array<Evidence, 9>& merged) {
+  Neighbourhood cells = {};
+  const std::uint32_t row = static_cast<std::uint32_t>(cell.i) % kBlockSide;
+  const std::uint32_t col = static_cast<std::uint32_t>(cell.j) % kBlockSide;
+  const bool inside =
+      row > 0 && col > 0 && row + 1 < kBlockSide && col + 1 < kBlockSide;
+  const Place center = PlaceOf(directory, cell);
+  for (std::size_t n = 0; n < 9; ++n) {
+    Place place;
+    if (inside) {
+      place = {.block = center.block,
+               .k = center.k + (n / 3) * kBlockSide + n % 3 - kBlockSide - 1};
+    } else {
+      const CellIndex at = {.i = cell.i + static_cast<std::int32_t>(n / 3) - 1,
+                            .j = cell.j + static_cast<std::int32_t>(n % 3) - 1};
+      if (!grid.Contains(at)) continue;
+      place = PlaceOf(directory, at);
+    }
+    if (place.block == nullptr || !place.block->measured(place.k)) continue;
+    if (place.block->transferred.empty()) {
+      cells[n] = &place.block->evidence[place.k];
+    } else {
+      merged[n] = place.block->AllEvidence(place.k);
+      cells[n] = &merged[n];
+    }
+  }
+  return cells;
+}
+
+MeanVariance ReadKalman(const Evidence& evidence, const CellPrior& prior) {
+  const double variance_m2 = 1.0 / evidence.weight;
+  if (prior.kind == EvidenceKind::kNone || prior.kind == EvidenceKind::kLand) {
+    return {.mean_m = evidence.mean_m, .variance_m2 = variance_m2};
+  }
+  const double prior_m2 = static_cast<double>(prior.std_m) * prior.std_m;
+  const double k = Gain(prior_m2, variance_m2);
+  return {.mean_m = CorrectMean(k, prior.depth_m, evidence.mean_m),
+          .variance_m2 = FuseVarianceKalman(k, prior_m2)};
+}
+
+DepthEstimate ToEstimate(const MeanVariance& read, EvidenceKind kind,
+                         const Evidence& evidence, double cell_size_m) {
+  const float std_m = static_cast<float>(std::sqrt(read.variance_m2));
+  return {.depth_m = static_cast<float>(read.mean_m),
+          .std_m = std::max(std_m, kMinStdM),
+          .kind = kind,
+          .time_s = evidence.time_s,
+          .shoalest_m = evidence.shoalest_m,
+          .cell_size_m = static_cast<float>(cell_size_m)};
+}
+
+MeanVariance FromNervegna(const NervegnaCell& cell) {
+  return {.mean_m = cell.mean_m, .variance_m2 = cell.variance_m2};
+}
+
+// The reading of a measured cell. REQUIRES: the cell lies in the grid.
+std::optional<DepthEstimate> ReadMeasured(const LocalGrid& grid,
+                                          const BlockDirectory& directory,
+                                          CellIndex cell) {
+  const Place place = PlaceOf(directory, cell);
+  if (place.block == nullptr || !place.block->measured(place.k)) {
+    return std::nullopt;
+  }
+  const double cell_size_m = grid.options.cell_size_m;
+  MeanVariance read;
+  Evidence evidence;
+  switch (grid.options.estimator) {
+    case EstimatorKind::kNervegna:
+      evidence = place.block->AllEvidence(place.k);
+      read = FromNervegna(place.block->nervegna[place.k]);
+      break;
+    case EstimatorKind::kKalman:
+      evidence = place.block->AllEvidence(place.k);
+      read = ReadKalman(evidence, place.block->prior(place.k));
+      break;
+    case EstimatorKind::kAdaptive: {
+      std::array<Evidence, 9> merged;
+      const Neighbourhood cells = Around(grid, directory, cell, merged);
+      evidence = *cells[kCenter];
+      read = ReadAdaptive(cells, place.block->prior(place.k), cell_size_m);
+      break;
+    }
+  }
+  return ToEstimate(read, EvidenceKind::kMeasured, evidence, cell_size_m);
+}
+
+// What smoothing wrote (nervegna) or reads (the others) for a cell that was
+// never measured.
+std::optional<DepthEstimate> ReadUnmeasured(const LocalGrid& grid,
+                                            const BlockDirectory& directory,
+                                            CellIndex cell) {
+  const Place place = PlaceOf(directory, cell);
+  if (grid.options.estimator == EstimatorKind::kNervegna) {
+    if (place.block == nullptr ||
+        (place.block->evidence[place.k].flags & kSmoothUpdated) == 0) {
+      return std::nullopt;
+    }
+    return ToEstimate(FromNervegna(place.block->nervegna[place.k]),
+                      EvidenceKind::kSmoothed, place.block->evidence[place.k],
+                      grid.options.cell_size_m);
+  }
+  if (grid.reach == 0) return std::nullopt;
+  const std::optional<DepthEstimate> smoothed = ReadSmoothed(
+      cell, SmoothBounds(cell, grid.reach, grid.cells_north, grid.cells_east),
+      grid.options.smoothing_scale, grid.options.cell_size_m,
+      [&](CellIndex near) { return ReadMeasured(grid, directory, near); });
+  if (!smoothed.has_value() || place.block == nullptr) return smoothed;
+  const CellPrior prior = place.block->prior(place.k);
+  const bool prior_is_better =
+      prior.kind == EvidenceKind::kLand ||
+      (prior.kind != EvidenceKind::kNone && prior.std_m <= smoothed->std_m);
+  return prior_is_better ? std::nullopt : smoothed;
+}
+
+}  // namespace
+
+LocalMapView::LocalMapView() = default;
+
+LocalMapView::LocalMapView(std::shared_ptr<const LocalGrid> grid,
+                           std::shared_ptr<const BlockDirectory> directory)
+    : grid_(std::move(grid)), directory_(std::move(directory)) {}
+
+std::optional<CellIndex> LocalMapView::CellAt(
+    const GeodeticPoint& point) const {
+  if (grid_ == nullptr) return std::nullopt;
+  const NedPoint at = grid_->frame.ToNed(point);
+  return grid_->Locate(at.north_m, at.east_m);
+}
+
+GeodeticPoint LocalMapView::CellCenter(CellIndex cell) const {
+  return grid_->Center(cell);
+}
+
+bool LocalMapView::Contains(const GeodeticPoint& point) const {
+  return CellAt(point).has_value();
+}
+
+std::optional<DepthEstimate> LocalMapView::At(
+    const GeodeticPoint& point) const {
+  const std::optional<CellIndex> cell = CellAt(point);
+  if (!cell.has_value()) return std::nullopt;
+  return AtCell(*cell);
+}
+
+std::optional<DepthEstimate> LocalMapView::AtCell(CellIndex cell) const {
+  if (grid_ == nullptr || !grid_->Contains(cell)) return std::nullopt;
+  const std::optional<DepthEstimate> measured =
+      ReadMeasured(*grid_, *directory_, cell);
+  if (measured.has_value()) return measured;
+  return ReadUnmeasured(*grid_, *directory_, cell);
+}
+
+std::optional<DepthEstimate> LocalMapView::EvidenceAt(
+    const GeodeticPoint& point) const {
+  const std::optional<CellIndex> cell = CellAt(point);
+  if (!cell.has_value()) return std::nullopt;
+  const Place place = PlaceOf(*directory_, *cell);
+  if (place.block == nullptr) return std::nullopt;
+  const Evidence& evidence = place.block->evidence[place.k];
+  if (evidence.empty()) return std::nullopt;
+  const double cell_size_m = grid_->options.cell_size_m;
+  MeanVariance read = {.mean_m = evidence.mean_m,
+                       .variance_m2 = 1.0 / evidence.weight};
+  switch (grid_->options.estimator) {
+    case EstimatorKind::kNervegna:
+      read.variance_m2 = place.block->nervegna[place.k].variance_m2;
+      break;
+    case EstimatorKind::kKalman:
+      break;
+    case EstimatorKind::kAdaptive: {
+      // The neighbours tell of the terrain, not of this cell's depth, so all
+      // they know may be used; of the cell itself only what is new.
+      std::array<Evidence, 9> merged;
+      Neighbourhood cells = Around(*grid_, *directory_, *cell, merged);
+      cells[kCenter] = &evidence;
+      read = ReadAdaptive(cells, CellPrior{}, cell_size_m);
+      break;
+    }
+  }
+  return ToEstimate(read, EvidenceKind::kMeasured, evidence, cell_size_m);
+}
+
+void LocalMapView::ForEachMeasuredArea(
+    const std::function<void(const AreaCorners& corners,
+                             std::size_t measured_cells)>& visit) const {
+  ForEachBlock([&](BlockIndex index, const LocalBlock& block) {
+    const std::size_t measured = static_cast<std::size_t>(
+        std::count_if(block.evidence.begin(), block.evidence.end(),
+                      [](const Evidence& cell) { return !cell.empty(); }));
+    if (measured == 0) return;
+    const std::uint32_t south = index.row * kBlockSide;
+    const std::uint32_t west = index.col * kBlockSide;
+    const std::uint32_t north =
+        std::min(south + kBlockSide, grid_->cells_north);
+    const std::uint32_t east = std::min(west + kBlockSide, grid_->cells_east);
+    visit({grid_->Corner(south, west), grid_->Corner(north, west),
+           grid_->Corner(north, east), grid_->Corner(south, east)},
+          measured);
+  });
+}
+
+void LocalMapView::ForEachBlock(
+    const std::function<void(BlockIndex, const LocalBlock&)>& visit) const {
+  if (directory_ != nullptr) directory_->ForEachNotIn(nullptr, visit);
+}
+
+const LocalBlock* LocalMapView::Block(BlockIndex index) const {
+  if (grid_ == nullptr || !grid_->Contains(index)) return nullptr;
+  return directory_->Find(index);
+}
+
+std::optional<DepthEstimate> LocalMapView::DefaultPrior() const {
+  if (grid_ == nullptr || !grid_->options.default_depth_m.has_value()) {
+    return std::nullopt;
+  }
+  return DepthEstimate{
+      .depth_m = *grid_->options.default_depth_m,
+      .std_m = *grid_->options.default_std_m,
+      .kind = EvidenceKind::kPrior,
+      .cell_size_m = static_cast<float>(grid_->options.cell_size_m)};
+}
+
+std::uint32_t LocalMapView::cells_north() const {
+  return grid_ == nullptr ? 0 : grid_->cells_north;
+}
+
+std::uint32_t LocalMapView::cells_east() const {
+  return grid_ == nullptr ? 0 : grid_->cells_east;
+}
+
+std::uint64_t LocalMapView::cells_measured() const {
+  return directory_ == nullptr ? 0 : directory_->cells_measured();
+}
+
+std::uint64_t LocalMapView::block_count() const {
+  return directory_ == nullptr ? 0 : directory_->block_count();
+}
+
+std::uint64_t LocalMapView::memory_bytes() const {
+  return directory_ == nullptr ? 0
+                               : sizeof(LocalGrid) + directory_->memory_bytes();
+}
+
+const LocalMapOptions& LocalMapView::options() const {
+  ABSL_ASSERT(grid_ != nullptr);
+  return grid_->options;
+}
+
+const NedFrame& LocalMapView::frame() const {
+  ABSL_ASSERT(grid_ != nullptr);
+  return grid_->frame;
+}
+
+void DiffBlocks(
+    const LocalMapView& old_view, const LocalMapView& now,
+    const std::function<void(BlockIndex, const LocalBlock&)>& visit) {
+  if (now.directory_ == nullptr || now.directory_ == old_view.directory_) {
+    return;
+  }
+  now.directory_->ForEachNotIn(old_view.directory_.get(), visit);
+}
+
+}  // namespace fathom::map
