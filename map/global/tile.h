@@ -28,6 +28,7 @@
 #ifndef FATHOM_MAP_GLOBAL_TILE_H_
 #define FATHOM_MAP_GLOBAL_TILE_H_
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -76,25 +77,22 @@ struct TileTotals {
 
 class Tile {
  public:
-  // One slot: a leaf of `level` below the root, or a child tile.
-  struct Slot {
-    Leaf leaf;
-    std::uint8_t level = 0;
-    std::shared_ptr<const Tile> child;  // Null for a leaf.
-  };
-
   // What lies at a position.
   struct Found {
-    Leaf leaf;  // residual_code is left 0: see FindSlot.
+    Leaf leaf;
     int level = 0;
     const Tile* child = nullptr;  // Not null: the leaf says nothing.
   };
 
-  // Builds a tile from its slots in Z-order. `tolerance_m` is the map's: what
-  // residual codes are measured in. REQUIRES: they cover the tile exactly.
-  static std::shared_ptr<const Tile> Build(const TileKey& key,
-                                           std::span<const Slot> slots,
-                                           float tolerance_m);
+  // Builds a tile from its slots in Z-order: levels[i] below the root and
+  // leaves[i]; a slot whose std_code is kChildCode takes the next of
+  // `children`. `tolerance_m` is the map's: what residual codes are measured
+  // in. REQUIRES: the levels cover the tile exactly, as many child slots as
+  // children, keys that agree.
+  static std::shared_ptr<const Tile> Build(
+      const TileKey& key, std::span<const std::uint8_t> levels,
+      std::span<const Leaf> leaves,
+      std::vector<std::shared_ptr<const Tile>> children, float tolerance_m);
 
   ~Tile() = default;
   Tile(const Tile&) = delete;
@@ -142,10 +140,10 @@ class Tile {
   static constexpr std::size_t kRecordBytes = 10;
 
   explicit Tile(const TileKey& key) : key_(key) {}
-  friend class TileBuilder;
+  void AddTotals(float tolerance_m);
 
+  // Index and level of the slot that covers a position.
   std::uint32_t IndexOf(std::uint32_t position, int* level) const;
-  static int LevelOfRun(std::uint64_t starts, unsigned start, int finest);
 
   const std::byte* Record(std::uint32_t slot) const {
     return records_ + slot * kRecordBytes;
@@ -153,17 +151,16 @@ class Tile {
 
   TileKey key_;
   mutable bool settled_ = false;
-  bool has_residuals_ = false;
   std::uint32_t slot_count_ = 0;
   std::uint64_t whole_ = 0;
   std::uint64_t divided_ = 0;
   // One allocation: words, ranks, records, residuals.
   std::unique_ptr<std::byte[]> bytes_;
   std::size_t byte_count_ = 0;
-  const std::uint64_t* words_ = nullptr;
-  const std::uint16_t* ranks_ = nullptr;  // One more than words.
+  const std::byte* words_ = nullptr;
+  const std::byte* ranks_ = nullptr;  // One more than words.
   const std::byte* records_ = nullptr;
-  const std::uint8_t* residuals_ = nullptr;  // Null if all are 0.
+  const std::byte* residuals_ = nullptr;  // Null if all are 0.
   std::vector<std::shared_ptr<const Tile>> children_;
   TileTotals totals_;
 };
