@@ -1,6 +1,7 @@
 #include "map/global/tile.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -18,6 +19,7 @@ constexpr int kBlockLevel = 3;
 
 // What an allocator adds to a block of memory, near enough.
 constexpr std::size_t kAllocationBytes = 16;
+constexpr std::size_t kControlBytes = 24;
 
 // Bits 0..n of a word. REQUIRES: n < 64.
 constexpr std::uint64_t UpTo(unsigned n) {
@@ -56,67 +58,72 @@ std::shared_ptr<const Tile> Tile::Build(
     const TileKey& key, std::span<const std::uint8_t> levels,
     std::span<const Leaf> leaves,
     std::vector<std::shared_ptr<const Tile>> children, float tolerance_m) {
-  std::shared_ptr<Tile> tile(new Tile(key));
-  tile->slot_count_ = static_cast<std::uint32_t>(levels.size());
-  tile->children_ = std::move(children);
-  tile->children_.shrink_to_fit();
-
   // The shape.
+  std::uint64_t whole = 0;
+  std::uint64_t divided = 0;
   std::array<std::uint64_t, 64> words;
   std::array<std::uint16_t, 65> ranks;
-  std::size_t word_count = 0;
+  std::size_t block_count = 0;
   ranks[0] = 0;
   std::uint32_t position = 0;
   for (const std::uint8_t level : levels) {
     const std::uint32_t block = position >> kBlockBits;
     if (level <= kBlockLevel) {
-      tile->whole_ |= std::uint64_t{1} << block;
+      whole |= std::uint64_t{1} << block;
     } else {
       if ((position & 63) == 0) {
-        tile->divided_ |= std::uint64_t{1} << block;
-        words[word_count] = 0;
-        ranks[word_count + 1] = ranks[word_count];
-        ++word_count;
+        divided |= std::uint64_t{1} << block;
+        words[block_count] = 0;
+        ranks[block_count + 1] = ranks[block_count];
+        ++block_count;
       }
-      words[word_count - 1] |= std::uint64_t{1} << (position & 63);
-      ++ranks[word_count];
+      words[block_count - 1] |= std::uint64_t{1} << (position & 63);
+      ++ranks[block_count];
     }
     position += SpanOf(level);
   }
 
-  // The one block of memory.
   const std::size_t slots = levels.size();
   const bool residuals =
       std::any_of(leaves.begin(), leaves.end(),
                   [](const Leaf& leaf) { return leaf.residual_code != 0; });
-  const std::size_t ranks_at = word_count * sizeof(std::uint64_t);
-  const std::size_t records_at =
-      ranks_at + (word_count + 1) * sizeof(std::uint16_t);
-  const std::size_t residuals_at = records_at + slots * kRecordBytes;
-  tile->byte_count_ = residuals_at + (residuals ? slots : 0);
-  tile->bytes_ = std::make_unique<std::byte[]>(tile->byte_count_);
-  std::byte* const bytes = tile->bytes_.get();
-  std::memcpy(bytes, words.data(), ranks_at);
-  std::memcpy(bytes + ranks_at, ranks.data(), records_at - ranks_at);
-  tile->words_ = bytes;
-  tile->ranks_ = bytes + ranks_at;
-  tile->records_ = bytes + records_at;
-  tile->residuals_ = residuals ? bytes + residuals_at : nullptr;
+  const std::size_t byte_count = sizeof(std::uint16_t) +
+                                 block_count * kBlockBytes +
+                                 slots * (kRecordBytes + (residuals ? 1u : 0u));
+  std::shared_ptr<Tile> tile(new (byte_count) Tile(key));
+  tile->whole_ = whole;
+  tile->divided_ = divided;
+  tile->slot_count_ = static_cast<std::uint16_t>(slots);
+  tile->block_count_ = static_cast<std::uint8_t>(block_count);
+  tile->has_residuals_ = residuals;
+  if (!children.empty()) {
+    children.shrink_to_fit();
+    tile->children_ =
+        std::make_unique<const std::vector<std::shared_ptr<const Tile>>>(
+            std::move(children));
+  }
 
+  std::byte* to = tile->bytes();
+  for (std::size_t k = 0; k < block_count; ++k) {
+    StoreAs(to, ranks[k]);
+    StoreAs(to + sizeof(std::uint16_t), words[k]);
+    to += kBlockBytes;
+  }
+  StoreAs(to, ranks[block_count]);
+  to += sizeof(std::uint16_t);
   std::uint32_t child = 0;
-  for (std::size_t i = 0; i < slots; ++i) {
-    std::byte* const record = bytes + records_at + i * kRecordBytes;
-    const Leaf& leaf = leaves[i];
-    if (leaf.std_code == kChildCode) {
-      StoreAs<std::uint32_t>(record + 4, child++);
-    } else {
-      StoreAs(record, leaf.depth_m);
-      StoreAs(record + 4, leaf.time_s);
-      if (residuals) {
-        bytes[residuals_at + i] = std::byte{leaf.residual_code};
-      }
+  for (const Leaf& leaf : leaves) {
+    const bool is_child = leaf.std_code == kChildCode;
+    StoreAs(to, is_child ? 0.0f : leaf.depth_m);
+    StoreAs(to + 4, is_child ? child++ : leaf.time_s);
+    StoreAs(to + 8, leaf.std_code);
+    to += kRecordBytes;
+  }
+  if (residuals) {
+    for (const Leaf& leaf : leaves) {
+      *to++ = std::byte{leaf.std_code == kChildCode ? std::uint8_t{0}
+                                                    : leaf.residual_code};
     }
-    StoreAs(record + 8, leaf.std_code);
   }
   tile->AddTotals(tolerance_m);
   return tile;
@@ -125,10 +132,14 @@ std::shared_ptr<const Tile> Tile::Build(
 void Tile::AddTotals(float tolerance_m) {
   TileTotals& totals = totals_;
   totals.tiles = 1;
-  totals.memory_bytes = sizeof(Tile) + byte_count_ +
-                        children_.size() * sizeof(std::shared_ptr<const Tile>) +
-                        // This, its reference count, its bytes, its children.
-                        4 * kAllocationBytes;
+  // The tile and the reference count, each an allocation.
+  totals.memory_bytes = sizeof(Tile) + ByteCount() + kAllocationBytes +
+                        kControlBytes + kAllocationBytes;
+  if (children_ != nullptr) {
+    totals.memory_bytes += sizeof(*children_) + kAllocationBytes +
+                           children_->size() * sizeof(children_->front()) +
+                           kAllocationBytes;
+  }
   for (std::uint32_t slot = 0; slot < slot_count_; ++slot) {
     if (IsChild(slot)) continue;
     const Leaf leaf = LeafAt(slot);
@@ -139,7 +150,7 @@ void Tile::AddTotals(float tolerance_m) {
     totals.shoalest_m = std::min(totals.shoalest_m, leaf.depth_m - residual_m);
     totals.deepest_m = std::max(totals.deepest_m, leaf.depth_m + residual_m);
   }
-  for (const std::shared_ptr<const Tile>& child : children_) {
+  for (const std::shared_ptr<const Tile>& child : this->children()) {
     const TileTotals& below = child->totals();
     totals.tiles += below.tiles;
     totals.leaves += below.leaves;
@@ -154,18 +165,17 @@ std::uint32_t Tile::IndexOf(std::uint32_t position, int* level) const {
   const unsigned block = position >> kBlockBits;
   const std::uint64_t up_to = UpTo(block);
   const unsigned wholes = static_cast<unsigned>(std::popcount(whole_ & up_to));
+  unsigned k = static_cast<unsigned>(std::popcount(divided_ & up_to));
   if ((divided_ >> block) & 1) {
-    const unsigned k =
-        static_cast<unsigned>(std::popcount(divided_ & up_to)) - 1;
-    const std::uint64_t word = LoadAs<std::uint64_t>(words_ + 8 * k);
+    const std::byte* const from = Block(--k);
+    const auto word = LoadAs<std::uint64_t>(from + sizeof(std::uint16_t));
     const unsigned inner = position & 63;
     *level = LevelAt(word, inner, kTileLevels);
-    return wholes + LoadAs<std::uint16_t>(ranks_ + 2 * k) +
+    return wholes + LoadAs<std::uint16_t>(from) +
            static_cast<unsigned>(std::popcount(word & UpTo(inner))) - 1;
   }
-  const unsigned k = static_cast<unsigned>(std::popcount(divided_ & up_to));
   *level = LevelAt(whole_ | divided_, block, kBlockLevel);
-  return wholes + LoadAs<std::uint16_t>(ranks_ + 2 * k) - 1;
+  return wholes + LoadAs<std::uint16_t>(Block(k)) - 1;
 }
 
 Tile::Found Tile::Find(std::uint32_t position) const {
@@ -173,7 +183,7 @@ Tile::Found Tile::Find(std::uint32_t position) const {
   const std::uint32_t slot = IndexOf(position, &found.level);
   found.leaf = LeafAt(slot);
   if (found.leaf.std_code == kChildCode) {
-    found.child = children_[found.leaf.time_s].get();
+    found.child = (*children_)[found.leaf.time_s].get();
   }
   return found;
 }
@@ -183,9 +193,9 @@ Leaf Tile::LeafAt(std::uint32_t slot) const {
   return {.depth_m = LoadAs<float>(record),
           .time_s = LoadAs<std::uint32_t>(record + 4),
           .std_code = LoadAs<std::uint16_t>(record + 8),
-          .residual_code = residuals_ == nullptr
-                               ? std::uint8_t{0}
-                               : static_cast<std::uint8_t>(residuals_[slot])};
+          .residual_code = has_residuals_ ? static_cast<std::uint8_t>(
+                                                *(Record(slot_count_) + slot))
+                                          : std::uint8_t{0}};
 }
 
 bool Tile::IsChild(std::uint32_t slot) const {
@@ -193,14 +203,14 @@ bool Tile::IsChild(std::uint32_t slot) const {
 }
 
 const std::shared_ptr<const Tile>& Tile::ChildAt(std::uint32_t slot) const {
-  return children_[LoadAs<std::uint32_t>(Record(slot) + 4)];
+  return (*children_)[LoadAs<std::uint32_t>(Record(slot) + 4)];
 }
 
 bool Tile::SameSlots(const Tile& other) const {
   // Children are numbered in Z-order, so that equal places have equal bytes.
   return slot_count_ == other.slot_count_ && whole_ == other.whole_ &&
-         divided_ == other.divided_ && byte_count_ == other.byte_count_ &&
-         std::memcmp(bytes_.get(), other.bytes_.get(), byte_count_) == 0;
+         divided_ == other.divided_ && has_residuals_ == other.has_residuals_ &&
+         std::memcmp(Block(0), other.Block(0), ByteCount()) == 0;
 }
 
 TileContent Tile::Content() const {
@@ -215,7 +225,7 @@ TileContent Tile::Content() const {
     content.depths_m.push_back(leaf.depth_m);
     content.std_codes.push_back(leaf.std_code);
     content.times_s.push_back(leaf.std_code == kChildCode ? 0 : leaf.time_s);
-    if (residuals_ != nullptr) {
+    if (has_residuals_) {
       content.residual_codes.push_back(leaf.residual_code);
     }
   });
