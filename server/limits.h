@@ -57,10 +57,6 @@ inline constexpr size_t kHistoryEstimatesPerMessage = 1000;
 // client narrows the time range.
 inline constexpr size_t kMaxHistoryEstimates = 100'000;
 
-// Contacts named in one point's answer, and the least probability of one.
-inline constexpr size_t kMaxContactsPerAnswer = 16;
-inline constexpr double kMinContactProbability = 1e-6;
-
 // Activities listed in GetMissionStatus.
 inline constexpr size_t kMaxActivitiesListed = 1000;
 
@@ -85,12 +81,6 @@ inline constexpr double kMaxDepthM = 12'000;
 inline constexpr double kMaxWaterLevelM = 50;
 // Position std: worse than this a ping places nothing.
 inline constexpr double kMaxPositionStdM = 100'000;
-// Horizontal range of an on-board sensor (radar, passive sonar).
-inline constexpr double kMaxContactRangeM = 200'000;
-// Speed of a contact, m/s: no vessel exceeds it.
-inline constexpr double kMaxContactSpeedMS = 60;
-inline constexpr double kMaxVelocityStdMS = 100;
-inline constexpr double kMaxBearingStdDeg = 60;
 // Std of a depth. The leaf's code ends at 1000 m.
 inline constexpr double kMaxDepthStdM = 1000;
 // Clearance and radius of a query.

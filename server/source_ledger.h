@@ -17,12 +17,12 @@
 #include <utility>
 
 #include "map/geodesy/ids.h"
+#include "storage/mission_records.h"
 
 namespace fathom::server {
 
-// The two streams of a source; each is numbered by itself. The numbers are
-// those of the mission file.
-enum class StreamKind : uint8_t { kPings = 1, kContacts = 2 };
+// The two streams of a source; each is numbered by itself.
+using storage::StreamKind;
 
 // A message's number.
 struct MessageNumber {

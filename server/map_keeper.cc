@@ -1,0 +1,602 @@
+#include "server/map_keeper.h"
+
+#include <algorithm>
+#include <iterator>
+#include <type_traits>
+
+#include "absl/strings/str_format.h"
+#include "base/status_macros.h"
+
+namespace fathom::server {
+namespace {
+
+// How long the storage thread is idle before it does housekeeping.
+constexpr std::chrono::milliseconds kIdleTime{1000};
+
+// What a message takes of the bound in bytes: its own memory.
+size_t BytesOf(const IngestMessage& message) {
+  size_t bytes = sizeof(message) + message.source.value.size();
+  if (const auto* ping = std::get_if<map::Ping>(&message.content)) {
+    bytes += ping->beams.size() * sizeof(map::Beam);
+  }
+  return bytes;
+}
+
+storage::SourcePosition PositionOf(const IngestMessage& message) {
+  return {.stream = message.kind,
+          .source = message.source,
+          .epoch = message.number.epoch,
+          .sequence = message.number.sequence};
+}
+
+// Tells what the map's own refusal means.
+std::string Describe(map::RejectReason reason) {
+  switch (reason) {
+    case map::RejectReason::kGated:
+      return "too far from where the contact can be";
+    case map::RejectReason::kTooLate:
+      return "older than the newest report about this contact";
+    case map::RejectReason::kContactsFull:
+      return "the contact list is full; drop contacts that are gone";
+    default:
+      return absl::StrFormat("refused: %s", map::RejectReasonName(reason));
+  }
+}
+
+}  // namespace
+
+MapKeeper::MapKeeper(Restored restored, MissionStore& store,
+                     KeeperOptions options)
+    : options_(std::move(options)),
+      store_(store),
+      map_(std::move(restored.map)),
+      ledger_(std::move(restored.ledger)),
+      records_since_checkpoint_(restored.journal_records),
+      checkpoint_revision_(restored.checkpoint ? restored.checkpoint->revision()
+                                               : 0),
+      saved_view_(std::move(restored.checkpoint)) {
+  storage_.journal_records = restored.journal_records;
+  storage_.durable_revision = map_->revision();
+  Publish();
+  mapper_ = std::thread([this] { RunMapper(); });
+  storage_thread_ = std::thread([this] { RunStorage(); });
+}
+
+MapKeeper::~MapKeeper() { (void)Stop(); }
+
+absl::Status MapKeeper::Stop() {
+  {
+    MutexLock lock(mutex_);
+    stopping_ = true;
+    queue_changed_.NotifyAll();
+    storage_changed_.NotifyAll();
+  }
+  if (mapper_.joinable()) mapper_.join();
+  if (storage_thread_.joinable()) storage_thread_.join();
+  gate_.Close();
+  MutexLock lock(mutex_);
+  return end_;
+}
+
+// ---- Reading ----
+
+std::shared_ptr<const map::ObstacleMapView> MapKeeper::View() const {
+  MutexLock lock(view_mutex_);
+  return view_;
+}
+
+map::RejectCounts MapKeeper::contact_rejects() const {
+  MutexLock lock(view_mutex_);
+  return contact_rejects_;
+}
+
+StorageState MapKeeper::storage_state() const {
+  MutexLock lock(mutex_);
+  return storage_;
+}
+
+// ---- Ingest ----
+
+absl::Status MapKeeper::Admit() const {
+  if (!storage_.fault.empty()) {
+    return absl::ResourceExhaustedError(storage_.fault);
+  }
+  if (stopping_) return absl::UnavailableError("the server is shutting down");
+  return absl::OkStatus();
+}
+
+bool MapKeeper::HasRoom() const {
+  return pending_messages_ < options_.max_pending_ingest &&
+         pending_bytes_ < options_.max_pending_bytes;
+}
+
+void MapKeeper::Push(IngestMessage message,
+                     std::shared_ptr<IngestListener> listener) {
+  const size_t bytes = BytesOf(message);
+  pending_messages_ += 1;
+  pending_bytes_ += bytes;
+  queue_.push_back(IngestCommand{.message = std::move(message),
+                                 .listener = std::move(listener),
+                                 .bytes = bytes});
+}
+
+absl::StatusOr<Room> MapKeeper::Submit(
+    IngestMessage message, std::shared_ptr<IngestListener> listener) {
+  MutexLock lock(mutex_);
+  FATHOM_RETURN_IF_ERROR(Admit());
+  Push(std::move(message), listener);
+  queue_changed_.NotifyOne();
+  if (HasRoom()) return Room::kSome;
+  waiting_.push_back(std::move(listener));
+  return Room::kNone;
+}
+
+absl::Status MapKeeper::SubmitAll(std::vector<IngestMessage> messages,
+                                  std::shared_ptr<IngestListener> listener) {
+  MutexLock lock(mutex_);
+  FATHOM_RETURN_IF_ERROR(Admit());
+  if (pending_messages_ + messages.size() > options_.max_pending_ingest) {
+    return absl::AbortedError("the queue has no room for the batch");
+  }
+  for (IngestMessage& message : messages) Push(std::move(message), listener);
+  queue_changed_.NotifyOne();
+  return absl::OkStatus();
+}
+
+// ---- Commands ----
+
+template <typename Result, typename Apply>
+void MapKeeper::Enqueue(Done<Result> done, Apply apply) {
+  // Shared, because std::function copies and `done` is told by one of two.
+  auto told = std::make_shared<Done<Result>>(std::move(done));
+  MapCommand command;
+  command.apply = [this, told, apply = std::move(apply)](StorageItem& item) {
+    absl::StatusOr<Result> result = apply(item);
+    if (!result.ok()) {
+      (*told)(result.status());
+      return false;
+    }
+    item.revision = map_->revision();
+    item.done = [told, result = *std::move(result),
+                 revision = item.revision](const absl::Status& status) {
+      if (!status.ok()) {
+        (*told)(status);
+      } else {
+        (*told)(Applied<Result>{.result = result, .revision = revision});
+      }
+    };
+    return true;
+  };
+  absl::Status admitted;
+  {
+    MutexLock lock(mutex_);
+    admitted = Admit();
+    if (admitted.ok() && pending_commands_ >= options_.max_pending_commands) {
+      admitted = absl::AbortedError("too many commands wait");
+    }
+    if (admitted.ok()) {
+      pending_commands_ += 1;
+      queue_.push_back(std::move(command));
+      queue_changed_.NotifyOne();
+      return;
+    }
+  }
+  (*told)(admitted);
+}
+
+void MapKeeper::StartActivity(map::StartActivity event, Done<Nothing> done) {
+  Enqueue(std::move(done),
+          [this, event = std::move(event)](
+              StorageItem& item) -> absl::StatusOr<Nothing> {
+            FATHOM_RETURN_IF_ERROR(map_->Start(event));
+            item.record = storage::JournalRecord{map_->revision(), event};
+            return Nothing{};
+          });
+}
+
+void MapKeeper::CompleteActivity(map::ActivityId id, bool discard,
+                                 Done<map::TransferResult> done) {
+  Enqueue(std::move(done),
+          [this, id = std::move(id),
+           discard](StorageItem& item) -> absl::StatusOr<map::TransferResult> {
+            auto result = map_->Complete(id, discard);
+            if (result.ok()) item.checkpoint = Publish();
+            return result;
+          });
+}
+
+void MapKeeper::Transfer(map::ActivityId id, Done<map::TransferResult> done) {
+  Enqueue(std::move(done),
+          [this, id = std::move(id)](
+              StorageItem& item) -> absl::StatusOr<map::TransferResult> {
+            auto result = map_->Transfer(id);
+            if (result.ok()) item.checkpoint = Publish();
+            return result;
+          });
+}
+
+void MapKeeper::DropContact(map::DropContact event, Done<Nothing> done) {
+  Enqueue(std::move(done),
+          [this, event = std::move(event)](
+              StorageItem& item) -> absl::StatusOr<Nothing> {
+            FATHOM_ASSIGN_OR_RETURN(map::ContactOutcome outcome, map_->Drop(event));
+    item.record = storage::JournalRecord{map_->revision(), event};
+    item.contact_estimate = std::move(outcome.estimate);
+    return Nothing{};
+          });
+}
+
+void MapKeeper::Import(map::RasterBlock block, bool last,
+                       Done<map::ImportResult> done) {
+  // Shared, because std::function copies and a block holds megabytes.
+  auto shared = std::make_shared<const map::RasterBlock>(std::move(block));
+  Enqueue(std::move(done),
+          [this, shared,
+           last](StorageItem& item) -> absl::StatusOr<map::ImportResult> {
+            auto result = map_->Import(*shared, last);
+            if (result.ok() && last) item.checkpoint = Publish();
+            item.done_when_applied = !last;
+            return result;
+          });
+}
+
+// ---- The mapper thread ----
+
+bool MapKeeper::TakeCommands(std::vector<Command>& commands) {
+  MutexLock lock(mutex_);
+  while (queue_.empty() && !stopping_) queue_changed_.Wait(mutex_);
+  const size_t count = std::min(queue_.size(), options_.max_messages_per_view);
+  const auto end = queue_.begin() + static_cast<std::ptrdiff_t>(count);
+  commands.assign(std::make_move_iterator(queue_.begin()),
+                  std::make_move_iterator(end));
+  queue_.erase(queue_.begin(), end);
+  return count > 0;
+}
+
+void MapKeeper::RunMapper() {
+  std::vector<Command> commands;
+  std::vector<Told> told;
+  std::vector<std::function<void(const absl::Status&)>> applied;
+  while (TakeCommands(commands)) {
+    std::vector<StorageItem> items;
+    items.reserve(commands.size() + 1);
+    size_t refused_commands = 0;
+    for (Command& command : commands) {
+      StorageItem item;
+      if (auto* ingest = std::get_if<IngestCommand>(&command)) {
+        MessageOutcome outcome = ApplyMessage(ingest->message, item);
+        item.listener = ingest->listener;
+        item.number = ingest->message.number;
+        item.bytes = ingest->bytes;
+        told.push_back({std::move(ingest->listener), std::move(outcome)});
+      } else if (!std::get<MapCommand>(command).apply(item)) {
+        refused_commands += 1;
+        continue;
+      } else if (item.done_when_applied) {
+        refused_commands += 1;
+        applied.push_back(std::move(item.done));
+        continue;
+      }
+      item.revision = map_->revision();
+      if (item.record.has_value()) records_since_checkpoint_ += 1;
+      if (item.checkpoint != nullptr) {
+        records_since_checkpoint_ = 0;
+        checkpoint_revision_ = item.checkpoint->revision();
+      }
+      items.push_back(std::move(item));
+    }
+    commands.clear();
+    const ViewPtr view = Publish();
+    if (records_since_checkpoint_ >= options_.journal_max_records) {
+      StorageItem item;
+      item.checkpoint = view;
+      item.revision = view->revision();
+      items.push_back(std::move(item));
+      records_since_checkpoint_ = 0;
+      checkpoint_revision_ = view->revision();
+    }
+    for (const Told& message : told) {
+      message.listener->OnApplied(message.outcome);
+    }
+    told.clear();
+    for (const auto& done : applied) done(absl::OkStatus());
+    applied.clear();
+    if (refused_commands > 0) {
+      MutexLock lock(mutex_);
+      pending_commands_ -= refused_commands;
+    }
+    HandToStorage(std::move(items), /*last=*/false);
+  }
+  std::vector<StorageItem> last;
+  if (map_->revision() != checkpoint_revision_) {
+    // A snapshot at the end makes the next start quick.
+    StorageItem& item = last.emplace_back();
+    item.checkpoint = Publish();
+    item.revision = map_->revision();
+  }
+  HandToStorage(std::move(last), /*last=*/true);
+}
+
+MessageOutcome MapKeeper::ApplyMessage(IngestMessage& message,
+                                       StorageItem& item) {
+  MessageOutcome outcome;
+  outcome.number = message.number;
+  const Judgement judgement =
+      ledger_.Take(message.kind, message.source, message.number);
+  outcome.missing = judgement.missing;
+  switch (judgement.verdict) {
+    case Verdict::kDuplicate:
+      outcome.fate = MessageFate::kDuplicate;
+      break;
+    case Verdict::kOldEpoch:
+      outcome.fate = MessageFate::kRefused;
+      outcome.refusal = {map::RejectReason::kInvalidMessage, "epoch",
+                         "is older than the source's newest epoch"};
+      break;
+    case Verdict::kFull:
+      outcome.fate = MessageFate::kRefused;
+      outcome.refusal = {map::RejectReason::kInvalidMessage, "source_id",
+                         "the mission has taken in as many sources as it can"};
+      break;
+    case Verdict::kNew:
+      if (std::holds_alternative<map::Ping>(message.content)) {
+        ApplyPing(message, outcome, item);
+      } else if (std::holds_alternative<map::ContactReport>(message.content)) {
+        ApplyContact(message, outcome, item);
+      } else {
+        outcome.fate = MessageFate::kRefused;
+        outcome.refusal = std::get<Refusal>(std::move(message.content));
+      }
+      if (!item.record.has_value()) {
+        item.position = PositionOf(message);
+      }
+      break;
+  }
+  outcome.revision = map_->revision();
+  return outcome;
+}
+
+void MapKeeper::ApplyPing(IngestMessage& message, MessageOutcome& outcome,
+                          StorageItem& item) {
+  auto& ping = std::get<map::Ping>(message.content);
+  auto result = map_->ApplyPing(ping);
+  if (!result.ok()) {
+    outcome.fate = MessageFate::kRefused;
+    outcome.refusal = {map::RejectReason::kNoActivity, "activity_id",
+                       std::string(result.status().message())};
+    return;
+  }
+  outcome.accepted = result->accepted;
+  outcome.rejects = result->rejects;
+  item.record = storage::JournalRecord{
+      map_->revision(), storage::PingRecord{.source = message.source,
+                                            .epoch = message.number.epoch,
+                                            .sequence = message.number.sequence,
+                                            .ping = std::move(ping)}};
+}
+
+void MapKeeper::ApplyContact(IngestMessage& message, MessageOutcome& outcome,
+                             StorageItem& item) {
+  auto& report = std::get<map::ContactReport>(message.content);
+  const uint64_t revision_before = map_->revision();
+  map::ContactOutcome result = map_->ApplyContact(report);
+  if (!result.applied) {
+    const auto reason =
+        result.reason.value_or(map::RejectReason::kInvalidMessage);
+    outcome.fate = MessageFate::kRefused;
+    outcome.refusal = {reason, "", Describe(reason)};
+    // A refusal that the map counts is replayed like any other event.
+    if (map_->revision() == revision_before) return;
+  } else {
+    item.contact_estimate = std::move(result.estimate);
+  }
+  item.record = storage::JournalRecord{
+      map_->revision(),
+      storage::ContactRecord{.epoch = message.number.epoch,
+                             .sequence = message.number.sequence,
+                             .report = std::move(report)}};
+}
+
+MapKeeper::ViewPtr MapKeeper::Publish() {
+  ViewPtr view = map_->View();
+  ViewPtr replaced = view;
+  {
+    MutexLock lock(view_mutex_);
+    view_.swap(replaced);
+    contact_rejects_ = map_->contact_rejects();
+  }
+  gate_.Reach(view->revision());
+  // `replaced` may be the last reference to old pieces: freed here, outside
+  // the lock.
+  return view;
+}
+
+void MapKeeper::HandToStorage(std::vector<StorageItem> items, bool last) {
+  MutexLock lock(mutex_);
+  if (to_store_.empty()) {
+    to_store_ = std::move(items);
+  } else {
+    to_store_.insert(to_store_.end(), std::make_move_iterator(items.begin()),
+                     std::make_move_iterator(items.end()));
+  }
+  if (last) mapper_ended_ = true;
+  storage_changed_.NotifyOne();
+}
+
+// ---- The storage thread ----
+
+bool MapKeeper::TakeItems(std::vector<StorageItem>& items) {
+  bool idle_told = false;
+  while (true) {
+    bool idle = false;
+    {
+      MutexLock lock(mutex_);
+      while (to_store_.empty() && !mapper_ended_ && !idle) {
+        if (idle_told) {
+          storage_changed_.Wait(mutex_);
+        } else {
+          idle = !storage_changed_.WaitFor(mutex_, kIdleTime);
+        }
+      }
+      if (!to_store_.empty()) {
+        items.swap(to_store_);
+        return true;
+      }
+      if (mapper_ended_) return false;
+    }
+    store_.Idle();
+    idle_told = true;
+  }
+}
+
+void MapKeeper::RunStorage() {
+  std::vector<StorageItem> items;
+  absl::Status status;
+  while (TakeItems(items)) {
+    if (status.ok()) status = CommitItems(items);
+    if (status.ok()) {
+      TellDurable(items);
+    } else {
+      GiveUp(status, items);
+    }
+    items.clear();
+  }
+}
+
+absl::Status MapKeeper::CommitItems(std::vector<StorageItem>& items) {
+  size_t begin = 0;
+  while (begin < items.size()) {
+    // Up to and with the next checkpoint, which covers what is before it.
+    storage::Batch batch;
+    ViewPtr checkpoint;
+    size_t records = 0;
+    size_t end = begin;
+    for (; end < items.size() && checkpoint == nullptr; ++end) {
+      StorageItem& item = items[end];
+      if (item.contact_estimate.has_value()) {
+        batch.contact_history.push_back(
+            {.revision = item.record->revision,
+             .estimate = *std::move(item.contact_estimate)});
+      }
+      if (item.record.has_value()) {
+        batch.journal.push_back(*std::move(item.record));
+        records += 1;
+      }
+      if (item.position.has_value()) {
+        batch.source_positions.push_back(*std::move(item.position));
+      }
+      checkpoint = item.checkpoint;
+    }
+    if (checkpoint != nullptr) {
+      batch.checkpoint =
+          storage::Checkpoint{.now = checkpoint, .previous = saved_view_};
+    }
+    FATHOM_RETURN_IF_ERROR(CommitBatch(batch, items));
+    if (checkpoint != nullptr) saved_view_ = std::move(checkpoint);
+    {
+      MutexLock lock(mutex_);
+      storage_.durable_revision = items[end - 1].revision;
+      storage_.journal_records =
+          batch.checkpoint.has_value() ? 0 : storage_.journal_records + records;
+    }
+    begin = end;
+  }
+  return absl::OkStatus();
+}
+
+absl::Status MapKeeper::CommitBatch(const storage::Batch& batch,
+                                    const std::vector<StorageItem>& items) {
+  while (true) {
+    const absl::Status status = store_.Commit(batch);
+    if (!absl::IsResourceExhausted(status)) {
+      if (status.ok()) {
+        MutexLock lock(mutex_);
+        storage_.fault.clear();
+      } else {
+        EnterFault(status, items);
+      }
+      return status;
+    }
+    EnterFault(status, items);
+    MutexLock lock(mutex_);
+    // One failed attempt after stopping began is the last.
+    if (stopping_) return status;
+    storage_changed_.WaitFor(mutex_, options_.storage_retry_delay);
+  }
+}
+
+void MapKeeper::EnterFault(const absl::Status& status,
+                           const std::vector<StorageItem>& items) {
+  std::vector<std::shared_ptr<IngestListener>> listeners;
+  {
+    MutexLock lock(mutex_);
+    const bool first = storage_.fault.empty();
+    storage_.fault = std::string(status.message());
+    if (storage_.fault.empty()) storage_.fault = status.ToString();
+    if (!first) return;
+    listeners.swap(waiting_);
+  }
+  for (const StorageItem& item : items) {
+    if (item.listener != nullptr) listeners.push_back(item.listener);
+  }
+  std::sort(listeners.begin(), listeners.end());
+  listeners.erase(std::unique(listeners.begin(), listeners.end()),
+                  listeners.end());
+  for (const auto& listener : listeners) listener->OnFault();
+}
+
+void MapKeeper::TellDurable(std::vector<StorageItem>& items) {
+  size_t messages = 0;
+  size_t bytes = 0;
+  size_t commands = 0;
+  // Newest number of each listener, in the order of first appearance; few.
+  std::vector<std::pair<std::shared_ptr<IngestListener>, MessageNumber>> newest;
+  for (StorageItem& item : items) {
+    if (item.listener != nullptr) {
+      messages += 1;
+      bytes += item.bytes;
+      auto found = std::find_if(
+          newest.begin(), newest.end(),
+          [&](const auto& entry) { return entry.first == item.listener; });
+      if (found == newest.end()) {
+        newest.emplace_back(std::move(item.listener), item.number);
+      } else {
+        found->second = item.number;
+      }
+    } else if (item.done) {
+      commands += 1;
+    }
+  }
+  for (const auto& [listener, number] : newest) listener->OnDurable(number);
+  for (const StorageItem& item : items) {
+    if (item.done) item.done(absl::OkStatus());
+  }
+  std::vector<std::shared_ptr<IngestListener>> waiting;
+  {
+    MutexLock lock(mutex_);
+    pending_messages_ -= messages;
+    pending_bytes_ -= bytes;
+    pending_commands_ -= commands;
+    if (HasRoom()) waiting.swap(waiting_);
+  }
+  for (const auto& listener : waiting) listener->OnRoom();
+}
+
+void MapKeeper::GiveUp(const absl::Status& status,
+                       std::vector<StorageItem>& items) {
+  bool first = false;
+  bool fatal = false;
+  {
+    MutexLock lock(mutex_);
+    first = end_.ok();
+    if (first) end_ = status;
+    fatal = first && !absl::IsResourceExhausted(status);
+  }
+  for (const StorageItem& item : items) {
+    if (item.done) item.done(status);
+    if (!first && item.listener != nullptr) item.listener->OnFault();
+  }
+  if (fatal && options_.on_fatal) options_.on_fatal(status);
+}
+
+}  // namespace fathom::server

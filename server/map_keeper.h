@@ -1,0 +1,274 @@
+// MapKeeper: the one writer of the map. No gRPC, no protobuf, no SQL.
+//
+//   Submit -> queue -> mapper thread: dedupe, apply, publish a view
+//                   -> storage thread: group commit -> durable callbacks
+//
+// Invariants:
+//  1. Only the mapper thread touches the ObstacleMap; everyone else reads
+//     immutable views, which are swapped under a mutex held for a pointer
+//     copy.
+//  2. What was submitted first is applied first and durable first.
+//  3. A view is published before its messages are told applied; they are
+//     committed and fsynced before they are told durable.
+//  4. Work under way (submitted, not yet durable) is bounded in messages and
+//     bytes; a stream holds at most one message beyond the bound.
+//  5. After a storage fault nothing new is taken until the waiting batch is
+//     committed; queries go on; nothing that was told durable is lost.
+//
+// All changes of the file that are not in the journal (transfer, import) are
+// made durable by a checkpoint: the view at that moment, which the storage
+// thread encodes while the mapper goes on.
+//
+// Lock order: none is held while another is taken, nor during a callback.
+// Thread-safe.
+
+#ifndef FATHOM_SERVER_MAP_KEEPER_H_
+#define FATHOM_SERVER_MAP_KEEPER_H_
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "base/mutex.h"
+#include "base/time.h"
+#include "map/obstacle_map/obstacle_map.h"
+#include "server/ingest.h"
+#include "server/limits.h"
+#include "server/mission_store.h"
+#include "server/revision_gate.h"
+#include "server/source_ledger.h"
+
+namespace fathom::server {
+
+// Bounds of a keeper; the defaults are the server's, tests take smaller ones.
+struct KeeperOptions {
+  size_t max_pending_ingest = kMaxPendingIngest;
+  size_t max_pending_bytes = kMaxPendingIngestBytes;
+  size_t max_pending_commands = kMaxPendingCommands;
+  size_t max_messages_per_view = kMaxMessagesPerView;
+  size_t journal_max_records = kJournalMaxRecords;
+  std::chrono::milliseconds storage_retry_delay = kStorageRetryDelay;
+  // Called once, on the storage thread, when the file must not be written any
+  // more (I/O error, failed fsync): the program should end. Without it the
+  // keeper only stays in fault.
+  std::function<void(const absl::Status&)> on_fatal;
+};
+
+// Whether another message may follow.
+enum class Room {
+  kSome,
+  // Wait for OnRoom before submitting again.
+  kNone,
+};
+
+// The result of a command and the revision that shows it.
+template <typename Result>
+struct Applied {
+  Result result;
+  uint64_t revision = 0;
+};
+template <typename Result>
+using Done = std::function<void(absl::StatusOr<Applied<Result>>)>;
+
+// For commands whose only result is the revision.
+struct Nothing {};
+
+// State of the way to the disk.
+struct StorageState {
+  // Every change up to this revision survives a power cut.
+  uint64_t durable_revision = 0;
+  // Journal records behind the last checkpoint.
+  uint64_t journal_records = 0;
+  // Why nothing new is taken; empty: all is well.
+  std::string fault;
+};
+
+// See file comment.
+class MapKeeper {
+ public:
+  // What a mission file held.
+  struct Restored {
+    // The map as of the last checkpoint, with the journal replayed on it.
+    std::unique_ptr<map::ObstacleMap> map;
+    // The view before the replay: what the file's snapshot holds.
+    std::shared_ptr<const map::ObstacleMapView> checkpoint;
+    SourceLedger ledger;
+    // Records that were replayed.
+    size_t journal_records = 0;
+  };
+
+  // Starts the threads. `store` must outlive the keeper.
+  MapKeeper(Restored restored, MissionStore& store, KeeperOptions options);
+  // Stops, if Stop was not called.
+  ~MapKeeper();
+  MapKeeper(const MapKeeper&) = delete;
+  MapKeeper& operator=(const MapKeeper&) = delete;
+
+  // ---- Reading ----
+
+  // The newest view. Costs a lock and a reference count.
+  std::shared_ptr<const map::ObstacleMapView> View() const;
+
+  // See RevisionGate::Wait.
+  bool WaitForRevision(uint64_t revision, RevisionGate::Deadline deadline,
+                       RevisionGate::Callback callback) {
+    return gate_.Wait(revision, deadline, std::move(callback));
+  }
+
+  StorageState storage_state() const;
+  // Contact reports refused since the mission was opened, by reason.
+  map::RejectCounts contact_rejects() const;
+
+  // ---- Ingest ----
+
+  // Takes one message of a stream; always, if the answer is OK, also beyond
+  // the bound (by one a stream, invariant 4). Errors: RESOURCE_EXHAUSTED
+  // (storage fault; the message was not taken), UNAVAILABLE (stopping).
+  absl::StatusOr<Room> Submit(IngestMessage message,
+                              std::shared_ptr<IngestListener> listener);
+
+  // Takes all messages or none. Errors as Submit, and ABORTED if the queue
+  // has no room for them now.
+  absl::Status SubmitAll(std::vector<IngestMessage> messages,
+                         std::shared_ptr<IngestListener> listener);
+
+  // ---- Commands: `done` runs once, when the change is durable or was
+  // refused, on a thread of the keeper's. Beside the map's own errors:
+  // RESOURCE_EXHAUSTED (storage fault), ABORTED (too many commands wait),
+  // UNAVAILABLE (stopping). ----
+
+  void StartActivity(map::StartActivity event, Done<Nothing> done);
+  void CompleteActivity(map::ActivityId id, bool discard,
+                        Done<map::TransferResult> done);
+  void Transfer(map::ActivityId id, Done<map::TransferResult> done);
+  void DropContact(map::DropContact event, Done<Nothing> done);
+  // One block of a chart. Only the `last` is durable when `done` runs, and
+  // with it all before it; the others tell when they are applied.
+  void Import(map::RasterBlock block, bool last, Done<map::ImportResult> done);
+  // Takes nothing new, applies and commits what waits, makes a last
+  // checkpoint, ends the threads. Returns whether everything is durable.
+  // Errors: the storage fault that stands in the way. Idempotent.
+  absl::Status Stop();
+
+ private:
+  using ViewPtr = std::shared_ptr<const map::ObstacleMapView>;
+
+  // One step on the way to the disk, in the order of application.
+  struct StorageItem {
+    // What the journal, the history and the ledger keep of it.
+    std::optional<storage::JournalRecord> record;
+    std::optional<map::ContactEstimate> contact_estimate;
+    std::optional<storage::SourcePosition> position;
+    // Set: this view is to be saved whole.
+    ViewPtr checkpoint;
+    // Revision of the map behind it.
+    uint64_t revision = 0;
+    // Of an ingest message: whom to tell, and what it took of the bound.
+    std::shared_ptr<IngestListener> listener;
+    MessageNumber number;
+    size_t bytes = 0;
+    // Of a command: told when durable, or why it never will be.
+    std::function<void(const absl::Status&)> done;
+    // Of a command: `done` does not wait for the disk.
+    bool done_when_applied = false;
+  };
+  struct IngestCommand {
+    IngestMessage message;
+    std::shared_ptr<IngestListener> listener;
+    size_t bytes = 0;
+  };
+  struct MapCommand {
+    // Changes the map and fills the item. If the map refuses: tells the
+    // caller and returns false.
+    std::function<bool(StorageItem& item)> apply;
+  };
+  using Command = std::variant<IngestCommand, MapCommand>;
+  struct Told {
+    std::shared_ptr<IngestListener> listener;
+    MessageOutcome outcome;
+  };
+
+  template <typename Result, typename Apply>
+  void Enqueue(Done<Result> done, Apply apply);
+  absl::Status Admit() const FATHOM_REQUIRES(mutex_);
+  bool HasRoom() const FATHOM_REQUIRES(mutex_);
+  void Push(IngestMessage message, std::shared_ptr<IngestListener> listener)
+      FATHOM_REQUIRES(mutex_);
+
+  // The mapper thread.
+  void RunMapper();
+  bool TakeCommands(std::vector<Command>& commands);
+  MessageOutcome ApplyMessage(IngestMessage& message, StorageItem& item);
+  void ApplyPing(IngestMessage& message, MessageOutcome& outcome,
+                 StorageItem& item);
+  void ApplyContact(IngestMessage& message, MessageOutcome& outcome,
+                    StorageItem& item);
+  // Publishes the map as it is now.
+  ViewPtr Publish();
+  void HandToStorage(std::vector<StorageItem> items, bool last);
+
+  // The storage thread.
+  void RunStorage();
+  bool TakeItems(std::vector<StorageItem>& items);
+  // Commits the items, again and again while the disk is full. An error: the
+  // keeper gave up.
+  absl::Status CommitItems(std::vector<StorageItem>& items);
+  absl::Status CommitBatch(const storage::Batch& batch,
+                           const std::vector<StorageItem>& items);
+  void EnterFault(const absl::Status& status,
+                  const std::vector<StorageItem>& items);
+  void TellDurable(std::vector<StorageItem>& items);
+  void GiveUp(const absl::Status& status, std::vector<StorageItem>& items);
+
+  const KeeperOptions options_;
+  MissionStore& store_;
+
+  // ---- Mapper thread only (and the constructor). ----
+  std::unique_ptr<map::ObstacleMap> map_;
+  SourceLedger ledger_;
+  size_t records_since_checkpoint_ = 0;
+  uint64_t checkpoint_revision_ = 0;
+
+  // ---- Storage thread only (and the constructor). ----
+  ViewPtr saved_view_;
+
+  mutable Mutex view_mutex_;
+  ViewPtr view_ FATHOM_GUARDED_BY(view_mutex_);
+  map::RejectCounts contact_rejects_ FATHOM_GUARDED_BY(view_mutex_);
+
+  mutable Mutex mutex_;
+  CondVar queue_changed_;
+  CondVar storage_changed_;
+  std::deque<Command> queue_ FATHOM_GUARDED_BY(mutex_);
+  std::vector<StorageItem> to_store_ FATHOM_GUARDED_BY(mutex_);
+  // Listeners that were told Room::kNone.
+  std::vector<std::shared_ptr<IngestListener>> waiting_
+      FATHOM_GUARDED_BY(mutex_);
+  size_t pending_messages_ FATHOM_GUARDED_BY(mutex_) = 0;
+  size_t pending_bytes_ FATHOM_GUARDED_BY(mutex_) = 0;
+  size_t pending_commands_ FATHOM_GUARDED_BY(mutex_) = 0;
+  bool stopping_ FATHOM_GUARDED_BY(mutex_) = false;
+  bool mapper_ended_ FATHOM_GUARDED_BY(mutex_) = false;
+  // Not OK: the storage thread gave up.
+  absl::Status end_ FATHOM_GUARDED_BY(mutex_);
+  StorageState storage_ FATHOM_GUARDED_BY(mutex_);
+
+  RevisionGate gate_{kMaxRevisionWaiters};
+  std::thread mapper_;
+  std::thread storage_thread_;
+};
+
+}  // namespace fathom::server
+
+#endif  // FATHOM_SERVER_MAP_KEEPER_H_

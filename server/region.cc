@@ -1,0 +1,238 @@
+#include "server/region.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include "absl/strings/str_format.h"
+#include "base/status_macros.h"
+#include "server/convert_common.h"
+#include "server/errors.h"
+#include "server/field_checks.h"
+#include "server/limits.h"
+
+namespace fathom::server {
+namespace {
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr double kRadPerDeg = std::numbers::pi / 180;
+
+// Metres of one degree of latitude and of longitude: radii of curvature of
+// the WGS 84 ellipsoid in the meridian and the prime vertical (Rapp 1991,
+// "Geometric geodesy" part I, eqs. 3.87 and 3.99).
+struct DegreeLengths {
+  double latitude_m;
+  double longitude_m;
+};
+DegreeLengths LengthsAt(double latitude_deg) {
+  constexpr double kSemiMajorM = 6'378'137.0;
+  constexpr double kFlattening = 1 / 298.257223563;
+  constexpr double kEccentricity2 = kFlattening * (2 - kFlattening);
+  const double sine = std::sin(latitude_deg * kRadPerDeg);
+  const double w2 = 1 - kEccentricity2 * sine * sine;
+  const double prime_m = kSemiMajorM / std::sqrt(w2);
+  const double meridian_m = prime_m * (1 - kEccentricity2) / w2;
+  return {.latitude_m = meridian_m * kRadPerDeg,
+          .longitude_m =
+              prime_m * std::cos(latitude_deg * kRadPerDeg) * kRadPerDeg};
+}
+
+double Wrap(double longitude_deg) {
+  return longitude_deg > 180 ? longitude_deg - 360 : longitude_deg;
+}
+
+}  // namespace
+
+absl::StatusOr<Region> Region::Create(const v1::GetRegionRequest& request,
+                                      Time now) {
+  const FieldPath root;
+  Region region;
+  region.now_ = now;
+  const FieldPath south_west_path(root, "south_west");
+  const FieldPath north_east_path(root, "north_east");
+  if (!request.has_south_west()) return Missing(south_west_path, "a corner");
+  if (!request.has_north_east()) return Missing(north_east_path, "a corner");
+  FATHOM_ASSIGN_OR_RETURN(const map::GeodeticPoint south_west,
+                          CheckPoint(request.south_west(), south_west_path));
+  FATHOM_ASSIGN_OR_RETURN(const map::GeodeticPoint north_east,
+                          CheckPoint(request.north_east(), north_east_path));
+  const double height_deg = north_east.latitude_deg - south_west.latitude_deg;
+  if (height_deg <= 0) {
+    return InvalidField(
+        FieldPath(north_east_path, "latitude_deg").ToString(),
+        absl::StrFormat("%g deg is not north of south_west.latitude_deg=%g",
+                        north_east.latitude_deg, south_west.latitude_deg));
+  }
+  double width_deg = north_east.longitude_deg - south_west.longitude_deg;
+  if (width_deg < 0) width_deg += 360;
+  if (width_deg == 0) {
+    return InvalidField(FieldPath(north_east_path, "longitude_deg").ToString(),
+                        "equals south_west.longitude_deg: the area is empty");
+  }
+  FATHOM_RETURN_IF_ERROR(CheckNumber(
+      request.resolution_m(), {.min = kMinResolutionM, .max = 1e7, .unit = "m"},
+      FieldPath(root, "resolution_m")));
+  if (!request.activity_id().empty()) {
+    FATHOM_RETURN_IF_ERROR(
+        CheckId(request.activity_id(), FieldPath(root, "activity_id")));
+    region.activity_id_.value = request.activity_id();
+  }
+  switch (request.layer()) {
+    case v1::MAP_LAYER_UNSPECIFIED:
+      break;
+    case v1::MAP_LAYER_LOCAL:
+      region.layers_ = map::LayerChoice::kLocalOnly;
+      break;
+    case v1::MAP_LAYER_GLOBAL:
+      if (!region.activity_id_.empty()) {
+        return InvalidField("layer",
+                            "an activity_id is given, which is not in the "
+                            "global layer");
+      }
+      region.layers_ = map::LayerChoice::kGlobalOnly;
+      break;
+    default:
+      return InvalidField("layer", absl::StrFormat("%d is not a known MapLayer",
+                                                   request.layer()));
+  }
+
+  const DegreeLengths lengths =
+      LengthsAt(south_west.latitude_deg + height_deg / 2);
+  region.resolution_m_ = request.resolution_m();
+  region.latitude_step_deg_ = request.resolution_m() / lengths.latitude_m;
+  region.longitude_step_deg_ =
+      request.resolution_m() / std::max(lengths.longitude_m, 1.0);
+  // A whole number of cells must not become one more by rounding.
+  const double rows =
+      std::max(1.0, std::ceil(height_deg / region.latitude_step_deg_ - 1e-9));
+  const double columns =
+      std::max(1.0, std::ceil(width_deg / region.longitude_step_deg_ - 1e-9));
+  if (rows * columns > static_cast<double>(kMaxRegionCells)) {
+    return LimitExceeded("resolution_m cells",
+                         static_cast<uint64_t>(std::min(rows * columns, 1e18)),
+                         kMaxRegionCells);
+  }
+  region.rows_ = static_cast<uint32_t>(rows);
+  region.columns_ = static_cast<uint32_t>(columns);
+  region.north_west_ = {.latitude_deg = north_east.latitude_deg,
+                        .longitude_deg = south_west.longitude_deg};
+  return region;
+}
+
+absl::Status Region::Open(std::shared_ptr<const map::ObstacleMapView> view) {
+  if (!activity_id_.empty()) {
+    activity_ = view->FindActivity(activity_id_);
+    if (activity_ == nullptr) {
+      return absl::NotFoundError(absl::StrFormat(
+          "activity_id=%s was never started", activity_id_.value));
+    }
+    if (!activity_->open()) {
+      return absl::FailedPreconditionError(absl::StrFormat(
+          "activity_id=%s has ended; its evidence is in the global map",
+          activity_id_.value));
+    }
+  }
+  bounds_level_ = view->global().root().LevelFor(resolution_m_) - 1;
+  view_ = std::move(view);
+  return absl::OkStatus();
+}
+
+std::optional<map::SeabedEstimate> Region::SeabedAt(
+    const map::GeodeticPoint& point) const {
+  if (activity_ != nullptr) return view_->SeabedInActivity(*activity_, point);
+  return view_->SeabedAt(point, layers_);
+}
+
+float Region::ShoalestIn(const map::GeodeticPoint& center,
+                         const map::SeabedEstimate& seabed) const {
+  float shoalest_m = seabed.estimate.depth_m;
+  if (!std::isnan(seabed.estimate.shoalest_m)) {
+    shoalest_m = std::min(shoalest_m, seabed.estimate.shoalest_m);
+  }
+  if (seabed.local || seabed.estimate.cell_size_m >= resolution_m_) {
+    return shoalest_m;
+  }
+  // Finer leaves lie in the answer cell. The quadtree cells at its corners are
+  // at least as large as it, so together they cover it.
+  const int level = std::max(bounds_level_, 0);
+  const map::RootSquare& root = view_->global().root();
+  for (const double north : {-0.5, 0.5}) {
+    for (const double east : {-0.5, 0.5}) {
+      const auto cell = root.Locate(
+          {.latitude_deg = std::clamp(
+               center.latitude_deg + north * latitude_step_deg_, -90.0, 90.0),
+           .longitude_deg =
+               Wrap(center.longitude_deg + east * longitude_step_deg_)},
+          level);
+      if (!cell.has_value()) continue;
+      const auto bounds = view_->global().Bounds(*cell);
+      if (bounds.has_value()) {
+        shoalest_m = std::min(shoalest_m, bounds->shoalest_m);
+      }
+    }
+  }
+  return shoalest_m;
+}
+
+bool Region::Next(v1::GetRegionResponse* out) {
+  if (next_row_ >= rows_) return false;
+  const uint32_t rows = std::min(kRegionTileSide, rows_ - next_row_);
+  const uint32_t columns = std::min(kRegionTileSide, columns_ - next_column_);
+  out->Clear();
+  out->set_total_rows(rows_);
+  out->set_total_columns(columns_);
+  WriteStamp(*view_, out->mutable_stamp());
+  v1::RegionTile* tile = out->mutable_tile();
+  const double north_deg =
+      north_west_.latitude_deg - next_row_ * latitude_step_deg_;
+  const double west_deg =
+      north_west_.longitude_deg + next_column_ * longitude_step_deg_;
+  tile->mutable_north_west()->set_latitude_deg(north_deg);
+  tile->mutable_north_west()->set_longitude_deg(Wrap(west_deg));
+  tile->set_latitude_step_deg(latitude_step_deg_);
+  tile->set_longitude_step_deg(longitude_step_deg_);
+  tile->set_rows(rows);
+  tile->set_columns(columns);
+  tile->set_first_row(next_row_);
+  tile->set_first_column(next_column_);
+  const int cells = static_cast<int>(rows * columns);
+  tile->mutable_depth_m()->Resize(cells, kNaN);
+  tile->mutable_std_m()->Resize(cells, kNaN);
+  tile->mutable_age_s()->Resize(cells, kNaN);
+  tile->mutable_shoalest_m()->Resize(cells, kNaN);
+  tile->mutable_kind()->assign(static_cast<size_t>(cells), '\0');
+  const double now_s = ToSeconds(now_.time_since_epoch());
+  for (uint32_t row = 0; row < rows; ++row) {
+    for (uint32_t column = 0; column < columns; ++column) {
+      const map::GeodeticPoint center = {
+          .latitude_deg =
+              std::max(north_deg - (row + 0.5) * latitude_step_deg_, -90.0),
+          .longitude_deg =
+              Wrap(west_deg + (column + 0.5) * longitude_step_deg_)};
+      const auto seabed = SeabedAt(center);
+      if (!seabed.has_value()) continue;
+      const map::DepthEstimate& estimate = seabed->estimate;
+      const int i = static_cast<int>(row * columns + column);
+      (*tile->mutable_kind())[static_cast<size_t>(i)] =
+          static_cast<char>(estimate.kind);
+      tile->set_depth_m(i, estimate.depth_m);
+      tile->set_std_m(i, estimate.std_m);
+      if (estimate.time_s != 0) {
+        tile->set_age_s(
+            i, static_cast<float>(std::max(
+                   0.0, now_s - static_cast<double>(estimate.time_s))));
+      }
+      tile->set_shoalest_m(i, ShoalestIn(center, *seabed));
+    }
+  }
+  next_column_ += columns;
+  if (next_column_ >= columns_) {
+    next_column_ = 0;
+    next_row_ += rows;
+  }
+  return true;
+}
+
+}  // namespace fathom::server

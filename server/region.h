@@ -1,0 +1,71 @@
+// GetRegion: the map over an area as a regular grid of latitude and longitude,
+// square at the area's middle latitude, handed out in blocks of at most
+// kRegionTileSide squared so that a slow reader costs one block of memory.
+//
+// A Region reads one immutable view. Not thread-safe; each call has its own.
+
+#ifndef FATHOM_SERVER_REGION_H_
+#define FATHOM_SERVER_REGION_H_
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "base/time.h"
+#include "fathom/v1/obstacle_service.pb.h"
+#include "map/obstacle_map/obstacle_map_view.h"
+
+namespace fathom::server {
+
+// See file comment.
+class Region {
+ public:
+  // The grid for `request`, not yet tied to a view. `now` is what ages count
+  // to. Errors: INVALID_ARGUMENT (field path); RESOURCE_EXHAUSTED past
+  // kMaxRegionCells.
+  static absl::StatusOr<Region> Create(const v1::GetRegionRequest& request,
+                                       Time now);
+
+  // What to read. Errors: NOT_FOUND (no such activity), FAILED_PRECONDITION
+  // (it has ended: its evidence is in the global map).
+  absl::Status Open(std::shared_ptr<const map::ObstacleMapView> view);
+
+  uint32_t rows() const { return rows_; }
+  uint32_t columns() const { return columns_; }
+
+  // Writes the next block, rows from north to south; false if there is none.
+  // REQUIRES: Open. About 0.2 us a cell.
+  bool Next(v1::GetRegionResponse* out);
+
+ private:
+  Region() = default;
+
+  std::optional<map::SeabedEstimate> SeabedAt(
+      const map::GeodeticPoint& point) const;
+  // The shoalest depth that the map can show in the cell around `center`.
+  float ShoalestIn(const map::GeodeticPoint& center,
+                   const map::SeabedEstimate& seabed) const;
+
+  std::shared_ptr<const map::ObstacleMapView> view_;
+  const map::ActivityView* activity_ = nullptr;
+  map::ActivityId activity_id_;
+  map::LayerChoice layers_ = map::LayerChoice::kJoined;
+  Time now_;
+  map::GeodeticPoint north_west_;
+  double latitude_step_deg_ = 0;
+  double longitude_step_deg_ = 0;
+  double resolution_m_ = 0;
+  uint32_t rows_ = 0;
+  uint32_t columns_ = 0;
+  // Level of the quadtree whose cells are at least as large as an answer
+  // cell; -1: the root itself is smaller.
+  int bounds_level_ = -1;
+  uint32_t next_row_ = 0;
+  uint32_t next_column_ = 0;
+};
+
+}  // namespace fathom::server
+
+#endif  // FATHOM_SERVER_REGION_H_
