@@ -85,6 +85,11 @@ struct Leaf {
   friend bool operator==(const Leaf&, const Leaf&) = default;
 };
 
+// The greatest distance that a residual code stands for.
+constexpr float DecodeResidualM(std::uint8_t residual_code, float tolerance_m) {
+  return static_cast<float>(residual_code) * tolerance_m / 255.0f;
+}
+
 // The kind that the rest of the map speaks of.
 constexpr EvidenceKind ToEvidenceKind(LeafKind kind) {
   switch (kind) {

@@ -166,9 +166,7 @@ std::optional<SquarePoint> RootSquare::Project(
 }
 
 GeodeticPoint RootSquare::Unproject(const SquarePoint& point) const {
-  // A direction in both planes; their order makes it point outwards.
-  return ToGeodetic(Cross(PlaneAt(cols_, (point.v - 0.5) * cols_.angle_rad),
-                          PlaneAt(rows_, (0.5 - point.u) * rows_.angle_rad)));
+  return ToGeodetic(Meet(RowPlane(point.u), ColPlane(point.v)));
 }
 
 std::optional<LatticePoint> RootSquare::LocateLattice(

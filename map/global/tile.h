@@ -10,8 +10,8 @@
 //   whole    64 bits, one for each block of 8 x 8 positions: a leaf of that
 //            size or larger begins here
 //   divided  64 bits: the block holds smaller leaves; it has
-//   words[k] 64 bits for the k-th divided block: a leaf begins at this position
-//   ranks[k] leaves in the divided blocks before the k-th, 16 bits
+//   word     of each divided block, 64 bits: a leaf begins at this position
+//   rank     of each divided block, 16 bits: leaves in those before it
 //
 // Finding a leaf costs three population counts and no loop, against one
 // dependent step per level in a tree of nodes (see docs/adr/0002). A full tile
@@ -32,6 +32,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <new>
 #include <span>
 #include <vector>
 
@@ -76,27 +77,25 @@ struct TileTotals {
 
 class Tile {
  public:
-  // One slot: a leaf of `level` below the root, or a child tile.
-  struct Slot {
-    Leaf leaf;
-    std::uint8_t level = 0;
-    std::shared_ptr<const Tile> child;  // Null for a leaf.
-  };
-
   // What lies at a position.
   struct Found {
-    Leaf leaf;  // residual_code is left 0: see FindSlot.
+    Leaf leaf;
     int level = 0;
     const Tile* child = nullptr;  // Not null: the leaf says nothing.
   };
 
-  // Builds a tile from its slots in Z-order. `tolerance_m` is the map's: what
-  // residual codes are measured in. REQUIRES: they cover the tile exactly.
-  static std::shared_ptr<const Tile> Build(const TileKey& key,
-                                           std::span<const Slot> slots,
-                                           float tolerance_m);
+  // Builds a tile from its slots in Z-order: levels[i] below the root and
+  // leaves[i]; a slot whose std_code is kChildCode takes the next of
+  // `children`. `tolerance_m` is the map's: what residual codes are measured
+  // in. REQUIRES: the levels cover the tile exactly, as many child slots as
+  // children, keys that agree.
+  static std::shared_ptr<const Tile> Build(
+      const TileKey& key, std::span<const std::uint8_t> levels,
+      std::span<const Leaf> leaves,
+      std::vector<std::shared_ptr<const Tile>> children, float tolerance_m);
 
   ~Tile() = default;
+  static void operator delete(void* tile) { ::operator delete(tile); }
   Tile(const Tile&) = delete;
   Tile& operator=(const Tile&) = delete;
 
@@ -120,7 +119,8 @@ class Tile {
 
   // Child tiles in Z-order.
   std::span<const std::shared_ptr<const Tile>> children() const {
-    return children_;
+    if (children_ == nullptr) return {};
+    return *children_;
   }
 
   const TileTotals& totals() const { return totals_; }
@@ -138,33 +138,49 @@ class Tile {
   void set_settled(bool settled) const { settled_ = settled; }
 
  private:
-  // One leaf in memory: 10 bytes, at any even address.
+  // The tile is one allocation: this object, and behind it
+  //   blocks   for each divided block its rank (2 bytes) and word (8 bytes)
+  //   2 bytes  the rank behind the last block: all leaves in divided blocks
+  //   records  for each slot depth, time and code (10 bytes)
+  //   residual codes, one byte for each slot, unless all are 0
+  // Fields lie at even addresses and are read with memcpy. A leaf is found in
+  // three lines of cache: this object's first, a block's, a record's.
+  static constexpr std::size_t kBlockBytes = 10;
   static constexpr std::size_t kRecordBytes = 10;
 
   explicit Tile(const TileKey& key) : key_(key) {}
-  friend class TileBuilder;
+  static void* operator new(std::size_t size, std::size_t bytes_behind) {
+    return ::operator new(size + bytes_behind);
+  }
+  static void operator delete(void* tile, std::size_t /*bytes_behind*/) {
+    ::operator delete(tile);
+  }
+  void AddTotals(float tolerance_m);
 
+  // Index and level of the slot that covers a position.
   std::uint32_t IndexOf(std::uint32_t position, int* level) const;
-  static int LevelOfRun(std::uint64_t starts, unsigned start, int finest);
 
-  const std::byte* Record(std::uint32_t slot) const {
-    return records_ + slot * kRecordBytes;
+  std::byte* bytes() { return reinterpret_cast<std::byte*>(this + 1); }
+  const std::byte* Block(std::size_t k) const {
+    return reinterpret_cast<const std::byte*>(this + 1) + k * kBlockBytes;
+  }
+  const std::byte* Record(std::size_t slot) const {
+    return Block(block_count_) + sizeof(std::uint16_t) + slot * kRecordBytes;
+  }
+  std::size_t ByteCount() const {
+    return sizeof(std::uint16_t) + block_count_ * kBlockBytes +
+           slot_count_ * (kRecordBytes + (has_residuals_ ? 1u : 0u));
   }
 
-  TileKey key_;
-  mutable bool settled_ = false;
-  bool has_residuals_ = false;
-  std::uint32_t slot_count_ = 0;
   std::uint64_t whole_ = 0;
   std::uint64_t divided_ = 0;
-  // One allocation: words, ranks, records, residuals.
-  std::unique_ptr<std::byte[]> bytes_;
-  std::size_t byte_count_ = 0;
-  const std::uint64_t* words_ = nullptr;
-  const std::uint16_t* ranks_ = nullptr;  // One more than words.
-  const std::byte* records_ = nullptr;
-  const std::uint8_t* residuals_ = nullptr;  // Null if all are 0.
-  std::vector<std::shared_ptr<const Tile>> children_;
+  std::uint16_t slot_count_ = 0;
+  std::uint8_t block_count_ = 0;
+  bool has_residuals_ = false;
+  mutable bool settled_ = false;
+  TileKey key_;
+  // Null without children: most tiles have none.
+  std::unique_ptr<const std::vector<std::shared_ptr<const Tile>>> children_;
   TileTotals totals_;
 };
 

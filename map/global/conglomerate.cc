@@ -1,0 +1,164 @@
+#include "map/global/conglomerate.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace fathom::map {
+namespace {
+
+// The smallest code that stands for at least `distance_m`; 256 if none does.
+int ResidualCodeFor(double distance_m, float tolerance_m) {
+  int code = static_cast<int>(
+      std::min(256.0, std::ceil(distance_m * 255.0 / tolerance_m)));
+  // Rounding of the division, of either sign.
+  while (code > 0 && code <= 255 &&
+         DecodeResidualM(static_cast<std::uint8_t>(code - 1), tolerance_m) >=
+             distance_m) {
+    --code;
+  }
+  while (code <= 255 && DecodeResidualM(static_cast<std::uint8_t>(code),
+                                        tolerance_m) < distance_m) {
+    ++code;
+  }
+  return code;
+}
+
+std::optional<Leaf> JoinByRange(const std::array<Leaf, 4>& four,
+                                float tolerance_m) {
+  double low = four[0].depth_m;
+  double high = four[0].depth_m;
+  for (const Leaf& leaf : four) {
+    const double residual_m = DecodeResidualM(leaf.residual_code, tolerance_m);
+    low = std::min(low, leaf.depth_m - residual_m);
+    high = std::max(high, leaf.depth_m + residual_m);
+  }
+  Leaf joined;
+  joined.depth_m = static_cast<float>(0.5 * (low + high));
+  const int code = ResidualCodeFor(
+      std::max(high - joined.depth_m, joined.depth_m - low), tolerance_m);
+  if (code > 255) return std::nullopt;
+  joined.residual_code = static_cast<std::uint8_t>(code);
+  double moment_m2 = 0;
+  for (const Leaf& leaf : four) {
+    const double std_m = leaf.std_m();
+    const double offset_m = leaf.depth_m - joined.depth_m;
+    moment_m2 += std_m * std_m + offset_m * offset_m;
+  }
+  joined.std_code =
+      MakeStdCode(four[0].kind(), static_cast<float>(std::sqrt(moment_m2 / 4)));
+  return joined;
+}
+
+std::optional<Leaf> JoinPairwise(const std::array<Leaf, 4>& four,
+                                 float tolerance_m) {
+  double mean_m = 0;
+  double std_m = 0;
+  int residual = 0;
+  for (const Leaf& leaf : four) {
+    for (const Leaf& other : four) {
+      if (std::abs(leaf.depth_m - other.depth_m) > tolerance_m) {
+        return std::nullopt;
+      }
+    }
+    mean_m += leaf.depth_m / 4.0;
+    std_m += leaf.std_m() / 4.0;
+  }
+  // Kept as far as the code reaches: this rule promises no bound.
+  for (const Leaf& leaf : four) {
+    residual = std::max(
+        residual,
+        leaf.residual_code +
+            ResidualCodeFor(std::abs(leaf.depth_m - mean_m), tolerance_m));
+  }
+  return Leaf{
+      .depth_m = static_cast<float>(mean_m),
+      .std_code = MakeStdCode(four[0].kind(), static_cast<float>(std_m)),
+      .residual_code = static_cast<std::uint8_t>(std::min(residual, 255))};
+}
+
+class Conglomerator {
+ public:
+  Conglomerator(WorkTree& tree, MergeRule rule) : tree_(tree), rule_(rule) {}
+
+  // True if the tile has become a single leaf, which then is open.
+  bool Visit(WorkNode& node) {
+    const bool settles = rule_ == MergeRule::kRange;
+    if (node.work == nullptr && settles && node.frozen->settled()) return false;
+    const bool was_frozen = node.work == nullptr;
+    WorkTile& tile = tree_.Open(node);
+    if (settles && tile.settled) return false;
+    for (std::uint32_t start = 0; start < kTileCells;) {
+      const std::uint32_t span = SpanOf(tile.levels[start]);
+      if (tile.leaves[start].std_code == kChildCode) {
+        WorkNode& child = tile.ChildAt(start);
+        if (Visit(child)) {
+          const Leaf leaf = child.work->leaves[0];
+          tree_.Discard(child);
+          tile.RemoveChild(start, leaf);
+        }
+      }
+      start += span;
+    }
+    for (int level = kTileLevels - 1; level >= 0; --level) {
+      JoinLevel(tile, level);
+    }
+    tile.settled = settles;
+    const bool single = tile.levels[0] == 0 && tile.key.level > 0;
+    if (was_frozen && !single) tree_.FreezeNode(node);
+    return single;
+  }
+
+  std::uint64_t merges() const { return merges_; }
+
+ private:
+  // Joins, in one tile, the leaves of `level` + 1 that can be joined.
+  void JoinLevel(WorkTile& tile, int level) {
+    const std::uint32_t span = SpanOf(level);
+    const std::uint32_t part = span / 4;
+    for (std::uint32_t start = 0; start < kTileCells; start += span) {
+      std::array<Leaf, 4> four;
+      bool all_leaves = true;
+      for (std::uint32_t i = 0; i < 4; ++i) {
+        four[i] = tile.leaves[start + i * part];
+        all_leaves = all_leaves && tile.levels[start + i * part] == level + 1 &&
+                     four[i].std_code != kChildCode;
+      }
+      if (!all_leaves) continue;
+      if (const auto joined = JoinFour(four, rule_, tree_.tolerance_m())) {
+        tile.Merge(start, level, *joined);
+        ++merges_;
+      }
+    }
+  }
+
+  WorkTree& tree_;
+  const MergeRule rule_;
+  std::uint64_t merges_ = 0;
+};
+
+}  // namespace
+
+std::optional<Leaf> JoinFour(const std::array<Leaf, 4>& four, MergeRule rule,
+                             float tolerance_m) {
+  std::uint32_t oldest_s = four[0].time_s;
+  for (const Leaf& leaf : four) {
+    if (leaf.kind() != four[0].kind()) return std::nullopt;
+    oldest_s = std::min(oldest_s, leaf.time_s);
+  }
+  if (!four[0].known()) return Leaf{};
+  std::optional<Leaf> joined = rule == MergeRule::kRange
+                                   ? JoinByRange(four, tolerance_m)
+                                   : JoinPairwise(four, tolerance_m);
+  // The oldest: an answer must not look fresher than a part of it is.
+  if (joined) joined->time_s = oldest_s;
+  return joined;
+}
+
+std::uint64_t ConglomerateTree(WorkTree& tree, MergeRule rule) {
+  Conglomerator conglomerator(tree, rule);
+  conglomerator.Visit(tree.root());
+  tree.CountMerges(conglomerator.merges());
+  return conglomerator.merges();
+}
+
+}  // namespace fathom::map

@@ -1,0 +1,117 @@
+#include "map/global/global_map.h"
+
+#include <bit>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_format.h"
+#include "map/global/conglomerate.h"
+#include "map/global/work_tree.h"
+
+namespace fathom::map {
+
+absl::Status GlobalMapOptions::Validate() const {
+  if (max_cells == 0) {
+    return absl::InvalidArgumentError("max_cells=0 must be at least 1");
+  }
+  if (!std::isfinite(tolerance_m) || tolerance_m <= 0) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("tolerance_m=%g must be finite and > 0", tolerance_m));
+  }
+  if (root.cell_size_m(0) <= 0) {
+    return absl::InvalidArgumentError("the root square was not created");
+  }
+  return absl::OkStatus();
+}
+
+GlobalMap::GlobalMap(const GlobalMapOptions& options)
+    : options_(options),
+      tree_(std::make_unique<WorkTree>(
+          nullptr, options.max_cells,
+          static_cast<float>(options.tolerance_m))) {}
+
+GlobalMap::GlobalMap(GlobalMap&&) noexcept = default;
+GlobalMap& GlobalMap::operator=(GlobalMap&&) noexcept = default;
+GlobalMap::~GlobalMap() = default;
+
+GlobalMap::ConglomerateSummary GlobalMap::Conglomerate(MergeRule rule) {
+  ConglomerateSummary summary;
+  summary.leaves_before = tree_->leaf_count();
+  summary.merges = ConglomerateTree(*tree_, rule);
+  summary.leaves_after = tree_->leaf_count();
+  return summary;
+}
+
+GlobalMapView GlobalMap::View() {
+  return GlobalMapView(options_.root, tree_->Freeze(), tree_->tolerance_m());
+}
+
+std::uint64_t GlobalMap::leaf_count() const { return tree_->leaf_count(); }
+
+absl::Status GlobalMap::RestoreTile(const TileKey& key, TileContent content) {
+  if (absl::Status status =
+          ValidateContent(key, content, options_.root.max_level());
+      !status.ok()) {
+    return status;
+  }
+  if (!restored_.emplace(key, std::move(content)).second) {
+    return absl::DataLossError(
+        absl::StrFormat("tile level=%d row=%d col=%d is given twice", key.level,
+                        key.row, key.col));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status GlobalMap::FinishRestore() {
+  const std::map<TileKey, TileContent> restored = std::move(restored_);
+  restored_.clear();
+  if (restored.empty()) return absl::OkStatus();
+  // Keys are ordered by level first: backwards is children before parents.
+  std::map<TileKey, std::shared_ptr<const Tile>> built;
+  for (auto it = restored.rbegin(); it != restored.rend(); ++it) {
+    const TileKey& key = it->first;
+    const TileContent& content = it->second;
+    std::vector<Leaf> leaves(content.levels.size());
+    std::vector<std::shared_ptr<const Tile>> children;
+    std::uint32_t position = 0;
+    for (std::size_t i = 0; i < leaves.size(); ++i) {
+      leaves[i] = {.depth_m = content.depths_m[i],
+                   .time_s = content.times_s[i],
+                   .std_code = content.std_codes[i],
+                   .residual_code = content.residual_codes.empty()
+                                        ? std::uint8_t{0}
+                                        : content.residual_codes[i]};
+      if (leaves[i].std_code == kChildCode) {
+        const CellKey cell = CellInTile(key, position, kTileLevels);
+        const auto child = built.find(
+            TileKey{.level = cell.level, .row = cell.row, .col = cell.col});
+        if (child == built.end()) {
+          return absl::DataLossError(
+              absl::StrFormat("tile level=%d row=%d col=%d is missing",
+                              cell.level, cell.row, cell.col));
+        }
+        children.push_back(std::move(child->second));
+        built.erase(child);
+      }
+      position += SpanOf(content.levels[i]);
+    }
+    built.emplace(key, Tile::Build(key, content.levels, leaves,
+                                   std::move(children), tree_->tolerance_m()));
+  }
+  const auto root = built.find(TileKey{});
+  if (root == built.end()) {
+    return absl::DataLossError("the root tile is missing (level=0)");
+  }
+  if (built.size() != 1) {
+    const TileKey& key = built.rbegin()->first;
+    return absl::DataLossError(
+        absl::StrFormat("tile level=%d row=%d col=%d hangs on no tile",
+                        key.level, key.row, key.col));
+  }
+  *tree_ = WorkTree(std::move(root->second), options_.max_cells,
+                    tree_->tolerance_m());
+  return absl::OkStatus();
+}
+
+}  // namespace fathom::map

@@ -1,0 +1,169 @@
+#include "map/global/global_map_view.h"
+
+#include <algorithm>
+#include <vector>
+
+namespace fathom::map {
+namespace {
+
+// The leaf that covers a lattice point, and its level.
+Tile::Found Descend(const Tile* tile, const LatticePoint& point) {
+  const std::uint64_t z =
+      (SpreadBits64(point.row) << 1) | SpreadBits64(point.col);
+  int shift = 2 * (kMaxLevel - kTileLevels);
+  for (;;) {
+    const Tile::Found found =
+        tile->Find(static_cast<std::uint32_t>(z >> shift) & (kTileCells - 1));
+    if (found.child == nullptr) {
+      Tile::Found leaf = found;
+      leaf.level += tile->key().level;
+      return leaf;
+    }
+    tile = found.child;
+    shift -= 2 * kTileLevels;
+  }
+}
+
+void VisitLeaves(
+    const Tile& tile,
+    const std::function<void(const CellKey&, const Leaf&)>& visit) {
+  tile.ForEachSlot([&](std::uint32_t position, std::uint32_t slot, int level) {
+    if (tile.IsChild(slot)) {
+      VisitLeaves(*tile.ChildAt(slot), visit);
+    } else {
+      visit(CellInTile(tile.key(), position, level), tile.LeafAt(slot));
+    }
+  });
+}
+
+void VisitTiles(const Tile& tile,
+                const std::function<void(const Tile&)>& visit) {
+  visit(tile);
+  for (const auto& child : tile.children()) VisitTiles(*child, visit);
+}
+
+using TileVisitor = std::function<void(const TileKey&, const Tile*)>;
+
+void VisitGone(const Tile& tile, const TileVisitor& visit) {
+  visit(tile.key(), nullptr);
+  for (const auto& child : tile.children()) VisitGone(*child, visit);
+}
+
+void VisitDifferent(const Tile* old, const Tile& now,
+                    const TileVisitor& visit) {
+  if (old == &now) return;
+  if (old == nullptr || !old->SameSlots(now)) visit(now.key(), &now);
+  // Siblings are of one level and in Z-order in both tiles.
+  const auto z_order = [](const std::shared_ptr<const Tile>& tile) {
+    return ZOrder(tile->key().row & (kTileSide - 1),
+                  tile->key().col & (kTileSide - 1));
+  };
+  std::span<const std::shared_ptr<const Tile>> before;
+  if (old != nullptr) before = old->children();
+  std::size_t next = 0;
+  for (const std::shared_ptr<const Tile>& child : now.children()) {
+    for (; next < before.size() && z_order(before[next]) < z_order(child);
+         ++next) {
+      VisitGone(*before[next], visit);
+    }
+    const bool both =
+        next < before.size() && before[next]->key() == child->key();
+    VisitDifferent(both ? before[next].get() : nullptr, *child, visit);
+    if (both) ++next;
+  }
+  for (; next < before.size(); ++next) VisitGone(*before[next], visit);
+}
+
+}  // namespace
+
+std::optional<DepthEstimate> GlobalMapView::At(
+    const GeodeticPoint& point) const {
+  const std::optional<LatticePoint> place = root_.LocateLattice(point);
+  if (!place || root_tile_ == nullptr) return std::nullopt;
+  const Tile::Found found = Descend(root_tile_.get(), *place);
+  if (!found.leaf.known()) return std::nullopt;
+  return DepthEstimate{
+      .depth_m = found.leaf.depth_m,
+      .std_m = found.leaf.std_m(),
+      .kind = ToEvidenceKind(found.leaf.kind()),
+      .time_s = found.leaf.time_s,
+      .cell_size_m = static_cast<float>(root_.cell_size_m(found.level))};
+}
+
+std::optional<std::pair<CellKey, Leaf>> GlobalMapView::LeafAt(
+    const GeodeticPoint& point) const {
+  const std::optional<LatticePoint> place = root_.LocateLattice(point);
+  if (!place || root_tile_ == nullptr) return std::nullopt;
+  const Tile::Found found = Descend(root_tile_.get(), *place);
+  const int up = kMaxLevel - found.level;
+  return std::pair{CellKey{.level = static_cast<std::uint8_t>(found.level),
+                           .row = place->row >> up,
+                           .col = place->col >> up},
+                   found.leaf};
+}
+
+std::optional<DepthBounds> GlobalMapView::Bounds(const CellKey& cell) const {
+  if (root_tile_ == nullptr) return std::nullopt;
+  DepthBounds bounds{.shoalest_m = std::numeric_limits<float>::infinity(),
+                     .deepest_m = -std::numeric_limits<float>::infinity()};
+  const auto add_leaf = [&](const Leaf& leaf) {
+    if (!leaf.known()) return;
+    const float residual_m = DecodeResidualM(leaf.residual_code, tolerance_m_);
+    bounds.shoalest_m = std::min(bounds.shoalest_m, leaf.depth_m - residual_m);
+    bounds.deepest_m = std::max(bounds.deepest_m, leaf.depth_m + residual_m);
+  };
+  const auto add_tile = [&](const Tile& tile) {
+    bounds.shoalest_m = std::min(bounds.shoalest_m, tile.totals().shoalest_m);
+    bounds.deepest_m = std::max(bounds.deepest_m, tile.totals().deepest_m);
+  };
+
+  const Tile* tile = root_tile_.get();
+  while (tile != nullptr) {
+    const int below = cell.level - tile->key().level;
+    if (below == 0) {
+      add_tile(*tile);
+      break;
+    }
+    const std::uint32_t begin = PositionInTile(cell, tile->key().level);
+    const Tile::Found found = tile->Find(begin);
+    if (found.child != nullptr && below >= kTileLevels) {
+      tile = found.child;
+      continue;
+    }
+    if (found.level <= below) {
+      add_leaf(found.leaf);
+      break;
+    }
+    // The cell is divided inside this tile.
+    for (std::uint32_t p = begin; p < begin + SpanOf(below);) {
+      const Tile::Found part = tile->Find(p);
+      if (part.child != nullptr) {
+        add_tile(*part.child);
+      } else {
+        add_leaf(part.leaf);
+      }
+      p += SpanOf(part.level);
+    }
+    break;
+  }
+  if (bounds.shoalest_m > bounds.deepest_m) return std::nullopt;
+  return bounds;
+}
+
+void GlobalMapView::ForEachLeaf(
+    const std::function<void(const CellKey&, const Leaf&)>& visit) const {
+  if (root_tile_ != nullptr) VisitLeaves(*root_tile_, visit);
+}
+
+void GlobalMapView::ForEachTile(
+    const std::function<void(const Tile&)>& visit) const {
+  if (root_tile_ != nullptr) VisitTiles(*root_tile_, visit);
+}
+
+void DiffTiles(const GlobalMapView& old, const GlobalMapView& now,
+               const std::function<void(const TileKey&, const Tile*)>& visit) {
+  if (now.root_tile() == nullptr) return;
+  VisitDifferent(old.root_tile().get(), *now.root_tile(), visit);
+}
+
+}  // namespace fathom::map

@@ -1,0 +1,290 @@
+#include "map/global/tile.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include "absl/strings/str_format.h"
+
+namespace fathom::map {
+namespace {
+
+// Positions of a block of `words`, as a power of two.
+constexpr unsigned kBlockBits = 6;
+// Slots of this level fill a block; deeper ones divide it.
+constexpr int kBlockLevel = 3;
+
+// What an allocator adds to a block of memory, near enough.
+constexpr std::size_t kAllocationBytes = 16;
+constexpr std::size_t kControlBytes = 24;
+
+// Bits 0..n of a word. REQUIRES: n < 64.
+constexpr std::uint64_t UpTo(unsigned n) {
+  return ~std::uint64_t{0} >> (63 - n);
+}
+
+// The level of the slot that covers bit `n` of `starts`, whose bits stand for
+// the cells `finest` levels down: a slot's length is the distance between its
+// own bit and the next.
+inline int LevelAt(std::uint64_t starts, unsigned n, int finest) {
+  const unsigned first =
+      63u - static_cast<unsigned>(std::countl_zero(starts & UpTo(n)));
+  // A shift by 64 is undefined, so by `first` and by one.
+  const std::uint64_t rest = (starts >> first) >> 1;
+  const unsigned length =
+      rest == 0 ? 64 - first
+                : 1 + static_cast<unsigned>(std::countr_zero(rest));
+  return finest - static_cast<int>(std::bit_width(length) - 1) / 2;
+}
+
+template <typename T>
+T LoadAs(const std::byte* from) {
+  T value;
+  std::memcpy(&value, from, sizeof value);
+  return value;
+}
+
+template <typename T>
+void StoreAs(std::byte* to, T value) {
+  std::memcpy(to, &value, sizeof value);
+}
+
+}  // namespace
+
+std::shared_ptr<const Tile> Tile::Build(
+    const TileKey& key, std::span<const std::uint8_t> levels,
+    std::span<const Leaf> leaves,
+    std::vector<std::shared_ptr<const Tile>> children, float tolerance_m) {
+  // The shape.
+  std::uint64_t whole = 0;
+  std::uint64_t divided = 0;
+  std::array<std::uint64_t, 64> words;
+  std::array<std::uint16_t, 65> ranks;
+  std::size_t block_count = 0;
+  ranks[0] = 0;
+  std::uint32_t position = 0;
+  for (const std::uint8_t level : levels) {
+    const std::uint32_t block = position >> kBlockBits;
+    if (level <= kBlockLevel) {
+      whole |= std::uint64_t{1} << block;
+    } else {
+      if ((position & 63) == 0) {
+        divided |= std::uint64_t{1} << block;
+        words[block_count] = 0;
+        ranks[block_count + 1] = ranks[block_count];
+        ++block_count;
+      }
+      words[block_count - 1] |= std::uint64_t{1} << (position & 63);
+      ++ranks[block_count];
+    }
+    position += SpanOf(level);
+  }
+
+  const std::size_t slots = levels.size();
+  const bool residuals =
+      std::any_of(leaves.begin(), leaves.end(),
+                  [](const Leaf& leaf) { return leaf.residual_code != 0; });
+  const std::size_t byte_count = sizeof(std::uint16_t) +
+                                 block_count * kBlockBytes +
+                                 slots * (kRecordBytes + (residuals ? 1u : 0u));
+  std::shared_ptr<Tile> tile(new (byte_count) Tile(key));
+  tile->whole_ = whole;
+  tile->divided_ = divided;
+  tile->slot_count_ = static_cast<std::uint16_t>(slots);
+  tile->block_count_ = static_cast<std::uint8_t>(block_count);
+  tile->has_residuals_ = residuals;
+  if (!children.empty()) {
+    children.shrink_to_fit();
+    tile->children_ =
+        std::make_unique<const std::vector<std::shared_ptr<const Tile>>>(
+            std::move(children));
+  }
+
+  std::byte* to = tile->bytes();
+  for (std::size_t k = 0; k < block_count; ++k) {
+    StoreAs(to, ranks[k]);
+    StoreAs(to + sizeof(std::uint16_t), words[k]);
+    to += kBlockBytes;
+  }
+  StoreAs(to, ranks[block_count]);
+  to += sizeof(std::uint16_t);
+  std::uint32_t child = 0;
+  for (const Leaf& leaf : leaves) {
+    const bool is_child = leaf.std_code == kChildCode;
+    StoreAs(to, is_child ? 0.0f : leaf.depth_m);
+    StoreAs(to + 4, is_child ? child++ : leaf.time_s);
+    StoreAs(to + 8, leaf.std_code);
+    to += kRecordBytes;
+  }
+  if (residuals) {
+    for (const Leaf& leaf : leaves) {
+      *to++ = std::byte{leaf.std_code == kChildCode ? std::uint8_t{0}
+                                                    : leaf.residual_code};
+    }
+  }
+  tile->AddTotals(tolerance_m);
+  return tile;
+}
+
+void Tile::AddTotals(float tolerance_m) {
+  TileTotals& totals = totals_;
+  totals.tiles = 1;
+  // The tile and the reference count, each an allocation.
+  totals.memory_bytes = sizeof(Tile) + ByteCount() + kAllocationBytes +
+                        kControlBytes + kAllocationBytes;
+  if (children_ != nullptr) {
+    totals.memory_bytes += sizeof(*children_) + kAllocationBytes +
+                           children_->size() * sizeof(children_->front()) +
+                           kAllocationBytes;
+  }
+  for (std::uint32_t slot = 0; slot < slot_count_; ++slot) {
+    if (IsChild(slot)) continue;
+    const Leaf leaf = LeafAt(slot);
+    ++totals.leaves;
+    if (!leaf.known()) continue;
+    ++totals.known_leaves;
+    const float residual_m = DecodeResidualM(leaf.residual_code, tolerance_m);
+    totals.shoalest_m = std::min(totals.shoalest_m, leaf.depth_m - residual_m);
+    totals.deepest_m = std::max(totals.deepest_m, leaf.depth_m + residual_m);
+  }
+  for (const std::shared_ptr<const Tile>& child : this->children()) {
+    const TileTotals& below = child->totals();
+    totals.tiles += below.tiles;
+    totals.leaves += below.leaves;
+    totals.known_leaves += below.known_leaves;
+    totals.memory_bytes += below.memory_bytes;
+    totals.shoalest_m = std::min(totals.shoalest_m, below.shoalest_m);
+    totals.deepest_m = std::max(totals.deepest_m, below.deepest_m);
+  }
+}
+
+std::uint32_t Tile::IndexOf(std::uint32_t position, int* level) const {
+  const unsigned block = position >> kBlockBits;
+  const std::uint64_t up_to = UpTo(block);
+  const unsigned wholes = static_cast<unsigned>(std::popcount(whole_ & up_to));
+  unsigned k = static_cast<unsigned>(std::popcount(divided_ & up_to));
+  if ((divided_ >> block) & 1) {
+    const std::byte* const from = Block(--k);
+    const auto word = LoadAs<std::uint64_t>(from + sizeof(std::uint16_t));
+    const unsigned inner = position & 63;
+    *level = LevelAt(word, inner, kTileLevels);
+    return wholes + LoadAs<std::uint16_t>(from) +
+           static_cast<unsigned>(std::popcount(word & UpTo(inner))) - 1;
+  }
+  *level = LevelAt(whole_ | divided_, block, kBlockLevel);
+  return wholes + LoadAs<std::uint16_t>(Block(k)) - 1;
+}
+
+Tile::Found Tile::Find(std::uint32_t position) const {
+  Found found;
+  const std::uint32_t slot = IndexOf(position, &found.level);
+  found.leaf = LeafAt(slot);
+  if (found.leaf.std_code == kChildCode) {
+    found.child = (*children_)[found.leaf.time_s].get();
+  }
+  return found;
+}
+
+Leaf Tile::LeafAt(std::uint32_t slot) const {
+  const std::byte* const record = Record(slot);
+  return {.depth_m = LoadAs<float>(record),
+          .time_s = LoadAs<std::uint32_t>(record + 4),
+          .std_code = LoadAs<std::uint16_t>(record + 8),
+          .residual_code = has_residuals_ ? static_cast<std::uint8_t>(
+                                                *(Record(slot_count_) + slot))
+                                          : std::uint8_t{0}};
+}
+
+bool Tile::IsChild(std::uint32_t slot) const {
+  return LoadAs<std::uint16_t>(Record(slot) + 8) == kChildCode;
+}
+
+const std::shared_ptr<const Tile>& Tile::ChildAt(std::uint32_t slot) const {
+  return (*children_)[LoadAs<std::uint32_t>(Record(slot) + 4)];
+}
+
+bool Tile::SameSlots(const Tile& other) const {
+  // Children are numbered in Z-order, so that equal places have equal bytes.
+  return slot_count_ == other.slot_count_ && whole_ == other.whole_ &&
+         divided_ == other.divided_ && has_residuals_ == other.has_residuals_ &&
+         std::memcmp(Block(0), other.Block(0), ByteCount()) == 0;
+}
+
+TileContent Tile::Content() const {
+  TileContent content;
+  content.levels.reserve(slot_count_);
+  content.depths_m.reserve(slot_count_);
+  content.std_codes.reserve(slot_count_);
+  content.times_s.reserve(slot_count_);
+  ForEachSlot([&](std::uint32_t, std::uint32_t slot, int level) {
+    const Leaf leaf = LeafAt(slot);
+    content.levels.push_back(static_cast<std::uint8_t>(level));
+    content.depths_m.push_back(leaf.depth_m);
+    content.std_codes.push_back(leaf.std_code);
+    content.times_s.push_back(leaf.std_code == kChildCode ? 0 : leaf.time_s);
+    if (has_residuals_) {
+      content.residual_codes.push_back(leaf.residual_code);
+    }
+  });
+  return content;
+}
+
+absl::Status ValidateContent(const TileKey& key, const TileContent& content,
+                             int max_level) {
+  const auto error = [&key](const std::string& what) {
+    return absl::DataLossError(absl::StrFormat(
+        "tile level=%d row=%d col=%d: %s", key.level, key.row, key.col, what));
+  };
+  if (!key.IsValid() || (key.level > 0 && key.level >= max_level)) {
+    return error(
+        absl::StrFormat("no tile of a map of max_level=%d has this "
+                        "key",
+                        max_level));
+  }
+  const std::size_t slots = content.levels.size();
+  if (slots == 0 || slots > kTileCells || content.depths_m.size() != slots ||
+      content.std_codes.size() != slots || content.times_s.size() != slots ||
+      (!content.residual_codes.empty() &&
+       content.residual_codes.size() != slots)) {
+    return error("the arrays have different lengths");
+  }
+  std::uint32_t position = 0;
+  bool residual_seen = content.residual_codes.empty();
+  for (std::size_t i = 0; i < slots; ++i) {
+    const int level = content.levels[i];
+    if (level > kTileLevels || key.level + level > max_level ||
+        position >= kTileCells || position % SpanOf(level) != 0) {
+      return error(
+          absl::StrFormat("slot %d of level %d does not fit", i, level));
+    }
+    position += SpanOf(level);
+    const std::uint16_t code = content.std_codes[i];
+    const float depth_m = content.depths_m[i];
+    const std::uint8_t residual = content.residual_codes.empty()
+                                      ? std::uint8_t{0}
+                                      : content.residual_codes[i];
+    residual_seen = residual_seen || residual != 0;
+    if ((code >> 14) == 0) {
+      const bool child = code == kChildCode;
+      if ((!child && code != 0) || std::bit_cast<std::uint32_t>(depth_m) != 0 ||
+          content.times_s[i] != 0 || residual != 0 ||
+          (child &&
+           (level != kTileLevels || key.level + kTileLevels >= max_level))) {
+        return error(
+            absl::StrFormat("slot %d without a leaf is not canonical", i));
+      }
+    } else if ((code & 0x3fff) > kMaxStdBits ||
+               !(depth_m >= kMinChartDepthM && depth_m <= kMaxChartDepthM)) {
+      return error(absl::StrFormat("slot %d holds depth_m=%g std_code=%d", i,
+                                   depth_m, code));
+    }
+  }
+  if (position != kTileCells) return error("the slots do not fill the tile");
+  if (!residual_seen) return error("residual codes are kept but all zero");
+  return absl::OkStatus();
+}
+
+}  // namespace fathom::map
