@@ -1,0 +1,174 @@
+// fathom-null-server: the floor under fathomd's figures. It speaks the same
+// contract through the same callback API with answers of the same size, and
+// does nothing else: what a call costs here is gRPC, Protobuf and the kernel.
+//
+//   fathom-null-server --port-file FILE     (loopback, any free port)
+#include <grpcpp/grpcpp.h>
+
+#include <CLI/CLI.hpp>
+#include <fstream>
+#include <iostream>
+#include <string>
+
+#include "fathom/v1/ingest_service.grpc.pb.h"
+#include "fathom/v1/obstacle_service.grpc.pb.h"
+
+namespace fathom::bench {
+namespace {
+
+// The number of messages behind one ack: about what a group commit of a few
+// milliseconds coalesces at full speed.
+constexpr uint64_t kPingsPerAck = 64;
+
+class NullObstacleService final : public v1::ObstacleService::CallbackService {
+ public:
+  grpc::ServerUnaryReactor* QueryObstacle(
+      grpc::CallbackServerContext* context, const v1::QueryObstacleRequest*,
+      v1::QueryObstacleResponse* response) override {
+    v1::ObstacleAnswer& answer = *response->mutable_answer();
+    answer.set_state(v1::OBSTACLE_STATE_FREE);
+    answer.set_probability(0.25);
+    v1::StaticEvidence& seabed = *answer.mutable_seabed();
+    seabed.set_probability(0.25);
+    seabed.set_layer(v1::MAP_LAYER_LOCAL);
+    seabed.set_kind(v1::EVIDENCE_KIND_MEASURED);
+    seabed.set_depth_m(20.5);
+    seabed.set_std_m(0.5);
+    seabed.set_age_s(60.5);
+    seabed.set_cell_size_m(10);
+    seabed.set_shoalest_m(19.5);
+    seabed.set_activity_id("bench");
+    v1::MapStamp& stamp = *response->mutable_stamp();
+    stamp.set_map_revision(4711);
+    stamp.mutable_as_of()->set_seconds(1'767'225'600);
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    reactor->Finish(grpc::Status::OK);
+    return reactor;
+  }
+
+  grpc::ServerUnaryReactor* QueryObstacles(
+      grpc::CallbackServerContext* context,
+      const v1::QueryObstaclesRequest* request,
+      v1::QueryObstaclesResponse* response) override {
+    const int points = request->depth_m_size();
+    response->mutable_probability()->Resize(points, 0.25f);
+    response->mutable_state()->Resize(points, v1::OBSTACLE_STATE_FREE);
+    if (request->with_reasons()) {
+      response->mutable_mean_depth_m()->Resize(points, 20.5f);
+      response->mutable_std_m()->Resize(points, 0.5f);
+      response->mutable_age_s()->Resize(points, 60.5f);
+      response->mutable_kind()->Resize(points, v1::EVIDENCE_KIND_MEASURED);
+    }
+    response->mutable_stamp()->set_map_revision(4711);
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    reactor->Finish(grpc::Status::OK);
+    return reactor;
+  }
+};
+
+// Reads pings and throws them away; acks every kPingsPerAck and at the end.
+class NullPingReactor final
+    : public grpc::ServerBidiReactor<v1::StreamPingsRequest,
+                                     v1::StreamPingsResponse> {
+ public:
+  NullPingReactor() { StartRead(&request_); }
+
+  void OnReadDone(bool ok) override {
+    if (!ok) {
+      read_all_ = true;
+      // OnWriteDone ends the stream if a write is on its way.
+      if (!writing_.exchange(true)) {
+        WriteLast();
+      }
+      return;
+    }
+    const v1::Ping& ping = request_.ping();
+    epoch_ = ping.epoch();
+    received_ = ping.sequence();
+    if (received_ % kPingsPerAck == 0 && !writing_.exchange(true)) {
+      Write();
+    }
+    StartRead(&request_);
+  }
+
+  void OnWriteDone(bool ok) override {
+    if (!ok || finishing_) {
+      Finish(grpc::Status::OK);
+    } else if (read_all_) {
+      WriteLast();
+    } else {
+      writing_ = false;
+      // Reading may have ended between the two lines above.
+      if (read_all_ && !writing_.exchange(true)) {
+        WriteLast();
+      }
+    }
+  }
+
+  void OnDone() override { delete this; }
+
+ private:
+  void Fill() {
+    response_.set_epoch(epoch_);
+    response_.set_applied_sequence(received_);
+    response_.set_durable_sequence(received_);
+    response_.set_map_revision(received_);
+    response_.set_pings_applied(received_);
+    response_.set_measurements_accepted(received_ * 101);
+  }
+  void Write() {
+    Fill();
+    StartWrite(&response_);
+  }
+  void WriteLast() {
+    finishing_ = true;
+    Write();
+  }
+
+  v1::StreamPingsRequest request_;
+  v1::StreamPingsResponse response_;
+  std::atomic<uint64_t> epoch_ = 0;
+  std::atomic<uint64_t> received_ = 0;
+  std::atomic<bool> writing_ = false;
+  std::atomic<bool> read_all_ = false;
+  std::atomic<bool> finishing_ = false;
+};
+
+class NullIngestService final : public v1::IngestService::CallbackService {
+ public:
+  grpc::ServerBidiReactor<v1::StreamPingsRequest, v1::StreamPingsResponse>*
+  StreamPings(grpc::CallbackServerContext*) override {
+    return new NullPingReactor();  // Deletes itself in OnDone.
+  }
+};
+
+int Main(int argc, char** argv) {
+  CLI::App app{"A server that answers at once and does nothing."};
+  std::string port_file;
+  app.add_option("--port-file", port_file, "Where to write the port")
+      ->required();
+  CLI11_PARSE(app, argc, argv);
+
+  NullObstacleService obstacle;
+  NullIngestService ingest;
+  grpc::ServerBuilder builder;
+  int port = 0;
+  builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(),
+                           &port);
+  builder.SetMaxReceiveMessageSize(64 << 20);
+  builder.RegisterService(&obstacle);
+  builder.RegisterService(&ingest);
+  const std::unique_ptr<grpc::Server> server = builder.BuildAndStart();
+  if (server == nullptr) {
+    std::cerr << "fathom-null-server: cannot listen on loopback\n";
+    return 1;
+  }
+  std::ofstream(port_file) << port << std::endl;
+  server->Wait();
+  return 0;
+}
+
+}  // namespace
+}  // namespace fathom::bench
+
+int main(int argc, char** argv) { return fathom::bench::Main(argc, argv); }
