@@ -52,8 +52,8 @@ struct LocalMapOptions {
   double smoothing_scale = 0.0;
 
   // What is assumed where no prior is known (4.3.2); both or neither.
-  std::optional<float> default_depth_m;
-  std::optional<float> default_std_m;
+  std::optional<float> default_depth_m = std::nullopt;
+  std::optional<float> default_std_m = std::nullopt;
 
   friend bool operator==(const LocalMapOptions&,
                          const LocalMapOptions&) = default;
