@@ -147,8 +147,9 @@ ContactReport ShipAt(double north_m, double east_m, int seconds) {
   report.key = {SourceId{"c4i"}, ContactId{"ship"}};
   report.contact_class = ContactClass::kVessel;
   report.time = At(seconds);
-  report.observation =
-      ContactFix{.position = Place(north_m, east_m), .velocity_north_m_s = 0, .velocity_east_m_s = 5};
+  report.observation = ContactFix{.position = Place(north_m, east_m),
+                                  .velocity_north_m_s = 0,
+                                  .velocity_east_m_s = 5};
   return report;
 }
 

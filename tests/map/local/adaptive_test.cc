@@ -1,0 +1,265 @@
+// The default estimator's promises (domain section 4), by hand-computed
+// numbers and by Monte Carlo with fixed seeds.
+
+#include "map/local/adaptive.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <random>
+
+#include "tests/map/local/local_test_map.h"
+
+namespace fathom::map {
+namespace {
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+const CellPrior kPrior20 = {
+    .depth_m = 20.0f, .std_m = 5.0f, .kind = EvidenceKind::kPrior};
+
+Neighbourhood Alone(const Evidence& evidence) {
+  Neighbourhood cells = {};
+  cells[kCenter] = &evidence;
+  return cells;
+}
+
+TEST(VariabilityAround, WithoutNeighboursIsThatOfATypicalSlope) {
+  Evidence evidence;
+  evidence.Add(20.0f, 0.5f, 1);
+  const RegionalVariability around = VariabilityAround(Alone(evidence), 10.0);
+  // A step of 0.03 * 10 = 0.3 m per cell: 0.09 / 12 = 0.0075 m^2.
+  EXPECT_NEAR(around.variance_m2, 0.0075, 1e-12);
+  EXPECT_EQ(around.degrees_of_freedom, 0.5);
+}
+
+TEST(VariabilityAround, APlaneVariesByItsStepsSquaredOverTwelve) {
+  // Nine cells, exact (std 1 mm), stepping 2 m north and 1 m east.
+  std::array<Evidence, 9> plane;
+  Neighbourhood cells;
+  for (std::size_t k = 0; k < 9; ++k) {
+    plane[k].Add(
+        20.0f + 2.0f * static_cast<float>(k / 3) + static_cast<float>(k % 3),
+        0.001f, 1);
+    cells[k] = &plane[k];
+  }
+  // (4 + 1) / 12 = 0.41667 with 4 degrees; typical 0.0075 with 0.5:
+  // (4 * 0.41667 + 0.5 * 0.0075) / 4.5 = 0.37120. Noise takes 2e-6 of it.
+  EXPECT_NEAR(VariabilityAround(cells, 10.0).variance_m2, 0.37120, 1e-5);
+}
+
+TEST(VariabilityAround, OneAxisStandsForTheOtherWhereThatHasNoPair) {
+  Evidence south, center;
+  south.Add(20.0f, 0.001f, 1);
+  center.Add(22.0f, 0.001f, 1);
+  Neighbourhood cells = Alone(center);
+  cells[1] = &south;
+  // One pair: half a degree at (4 + 4) / 12, half at 0.0075: 0.33708.
+  EXPECT_NEAR(VariabilityAround(cells, 10.0).variance_m2, 0.33708, 1e-5);
+}
+
+TEST(VariabilityInside, IsTheScatterBeyondTheStatedNoise) {
+  // Ten soundings of 0.1 m at 19 and 21 m in turn: W = 1000, mean 20,
+  // scatter = 10 * 100 * 1 = 1000, freedom 9: excess (1000 - 9) * 10 / 1000 =
+  // 9.91 m^2; alone 9.91 / 9 = 1.1011. 1000 is far beyond chance.
+  Evidence evidence;
+  for (int k = 0; k < 10; ++k) {
+    evidence.Add(k % 2 == 0 ? 19.0f : 21.0f, 0.1f, 1);
+  }
+  const RegionalVariability calm = {.variance_m2 = 0.0075,
+                                    .degrees_of_freedom = 0.5};
+  EXPECT_NEAR(VariabilityInside(evidence, calm), 1.1011, 1e-3);
+}
+
+TEST(VariabilityInside, AgreeingSoundingsForgetASteepRegion) {
+  Evidence evidence;
+  for (int k = 0; k < 100; ++k) evidence.Add(20.0f, 0.1f, 1);
+  const RegionalVariability steep = {.variance_m2 = 1.0,
+                                     .degrees_of_freedom = 4.5};
+  // (4.5 * 1 + (0 - 99) * 100 / 10000) / (4.5 + 99) = 3.51 / 103.5 = 0.03391.
+  EXPECT_NEAR(VariabilityInside(evidence, steep), 0.03391, 1e-4);
+}
+
+TEST(FusePrior, WithinWhatIsExplainedIsEq4_18And4_20) {
+  // Prior 20, 4 m^2; evidence 21, 1 m^2: k = 0.8, 20.8, 0.8 m^2.
+  const MeanVariance fused = FusePrior({21.0, 1.0}, 5, 20.0, 4.0);
+  EXPECT_NEAR(fused.mean_m, 20.8, 1e-12);
+  EXPECT_NEAR(fused.variance_m2, 0.8, 1e-12);
+}
+
+TEST(FusePrior, NoPriorLeavesTheEvidence) {
+  const MeanVariance fused = FusePrior({21.0, 1.0}, 5, 0.0, kInf);
+  EXPECT_EQ(fused.mean_m, 21.0);
+  EXPECT_EQ(fused.variance_m2, 1.0);
+}
+
+TEST(FusePrior, IsContinuousWhereThePriorBeginsToBeWidened) {
+  // d^2 = 4 + 1 = 5 is the border.
+  const double at_m = 20.0 + std::sqrt(5.0);
+  const MeanVariance below = FusePrior({at_m - 1e-9, 1.0}, 5, 20.0, 4.0);
+  const MeanVariance above = FusePrior({at_m + 1e-9, 1.0}, 5, 20.0, 4.0);
+  EXPECT_NEAR(below.mean_m, above.mean_m, 1e-8);
+  EXPECT_NEAR(below.variance_m2, above.variance_m2, 1e-8);
+}
+
+// A prior 15 m wrong that claims 1 m; soundings of 0.5 m at 35.
+TEST(Adaptive, PriorFifteenMetresWrongIsForgottenAfterTwoHits) {
+  const CellPrior wrong = {
+      .depth_m = 20.0f, .std_m = 1.0f, .kind = EvidenceKind::kPrior};
+  Evidence evidence;
+  evidence.Add(35.0f, 0.5f, 1);
+  const MeanVariance one = ReadAdaptive(Alone(evidence), wrong, 10.0);
+  // Either may be wrong: k = 1 / 1.25 = 0.8 about, k (1 - k) 225 = 36 m^2.
+  EXPECT_GT(std::sqrt(one.variance_m2), 5.0);
+  evidence.Add(35.0f, 0.5f, 2);
+  const MeanVariance two = ReadAdaptive(Alone(evidence), wrong, 10.0);
+  // Widened prior: 225 m^2 about; pulls by 15 * 0.125 / 225 = 8 mm.
+  EXPECT_NEAR(two.mean_m, 35.0, 0.02);
+  // sigma / sqrt(2) = 0.354 and a little variability.
+  EXPECT_LT(std::sqrt(two.variance_m2), 0.5);
+
+  // What 4.18 + 4.20 make of it: k = 1 / (1 + 0.125) = 0.889, 33.33 m: 1.7 m
+  // wrong and sure of it.
+  EXPECT_NEAR(20.0 + 15.0 / 1.125, 33.33, 0.01);
+}
+
+// Soundings of "no" error at different depths: the std is not below the
+// spread, whichever way that is counted (n - 1).
+TEST(Adaptive, DisagreeingCertainSoundingsLeaveAStdNotBelowTheirSpread) {
+  for (int n = 2; n <= 12; ++n) {
+    Evidence evidence;
+    double sum = 0.0, sum2 = 0.0;
+    for (int k = 0; k < n; ++k) {
+      const float depth_m = 20.0f + 2.0f * static_cast<float>(k % 2);
+      evidence.Add(depth_m, 1e-6f, 1);
+      sum += depth_m;
+      sum2 += depth_m * depth_m;
+    }
+    const double spread_m = std::sqrt((sum2 - sum * sum / n) / (n - 1));
+    const MeanVariance read = ReadAdaptive(Alone(evidence), CellPrior{}, 10.0);
+    EXPECT_GE(std::sqrt(read.variance_m2), spread_m) << n;
+    EXPECT_LE(std::sqrt(read.variance_m2), 1.5 * spread_m) << n;
+    EXPECT_NEAR(read.mean_m, sum / n, 1e-3) << n;
+  }
+}
+
+// Truths from the prior, pings that agree: the error is within 10 % of
+// sigma / sqrt(n). 4000 trials know an RMSE to 1.1 % (1 std).
+TEST(Adaptive, AgreeingPingsReachTheOptimum) {
+  constexpr int kTrials = 4000;
+  constexpr double kSigmaM = 0.5;
+  std::mt19937_64 random(11);
+  std::normal_distribution<double> normal;
+  for (const int pings : {1, 2, 5, 10, 100}) {
+    double square = 0.0;
+    int within_1 = 0, within_2 = 0;
+    for (int trial = 0; trial < kTrials; ++trial) {
+      const double truth_m = 20.0 + 5.0 * normal(random);
+      Evidence evidence;
+      for (int ping = 0; ping < pings; ++ping) {
+        evidence.Add(static_cast<float>(truth_m + kSigmaM * normal(random)),
+                     static_cast<float>(kSigmaM), 1);
+      }
+      // 1 m cells: hardly any variability is presumed.
+      const MeanVariance read = ReadAdaptive(Alone(evidence), kPrior20, 1.0);
+      const double error_m = read.mean_m - truth_m;
+      square += error_m * error_m;
+      within_1 += error_m * error_m <= read.variance_m2;
+      within_2 += error_m * error_m <= 4.0 * read.variance_m2;
+    }
+    const double rmse_m = std::sqrt(square / kTrials);
+    const double optimum_m = kSigmaM / std::sqrt(pings);
+    std::printf(
+        "adaptive, %3d pings that agree: RMSE %.4f m, optimum %.4f m; "
+        "%.1f %% within 1 std, %.1f %% within 2\n",
+        pings, rmse_m, optimum_m, 100.0 * within_1 / kTrials,
+        100.0 * within_2 / kTrials);
+    EXPECT_LE(rmse_m, 1.1 * optimum_m) << pings;
+    // Never overconfident beyond 3 points; unsure is allowed: chance scatter
+    // of few pings is taken for variability.
+    EXPECT_GE(within_1, 0.653 * kTrials) << pings;
+    EXPECT_GE(within_2, 0.925 * kTrials) << pings;
+  }
+}
+
+struct Coverage {
+  double within[3] = {0.0, 0.0, 0.0};  // Of 1, 2, 3 std.
+};
+
+// Depths anywhere in a cell of a slope against its estimate, `hits` soundings
+// of 0.3 m at random places in each of 12 x 12 cells of 10 m.
+Coverage CoverageOnASlope(double slope, double azimuth_rad, int hits,
+                          std::uint64_t seed) {
+  LocalMapOptions options = TestOptions(EstimatorKind::kAdaptive);
+  // No prior: a wrong one widens the answers and would hide the slope's part.
+  options.default_depth_m.reset();
+  options.default_std_m.reset();
+  LocalMap map = MakeMap(options);
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> inside(0.0, 10.0);
+  const auto truth_m = [&](double north_m, double east_m) {
+    return 20.0 + slope * (north_m * std::cos(azimuth_rad) +
+                           east_m * std::sin(azimuth_rad));
+  };
+  constexpr int kSide = 12;
+  for (int hit = 0; hit < hits; ++hit) {
+    for (int k = 0; k < kSide * kSide; ++k) {
+      const double north_m = 10.0 * (k / kSide) + inside(random);
+      const double east_m = 10.0 * (k % kSide) + inside(random);
+      map.Update(PingAt(options, north_m, east_m,
+                        static_cast<float>(truth_m(north_m, east_m) +
+                                           0.3 * normal(random)),
+                        0.3f),
+                 nullptr);
+    }
+  }
+  const LocalMapView view = map.View();
+  Coverage coverage;
+  constexpr int kProbes = 200;
+  for (int k = 0; k < kSide * kSide; ++k) {
+    const DepthEstimate estimate =
+        *view.AtCell({.i = k / kSide, .j = k % kSide});
+    for (int probe = 0; probe < kProbes; ++probe) {
+      const double error_m = truth_m(10.0 * (k / kSide) + inside(random),
+                                     10.0 * (k % kSide) + inside(random)) -
+                             estimate.depth_m;
+      for (int n = 0; n < 3; ++n) {
+        if (std::fabs(error_m) <= (n + 1.0) * estimate.std_m) {
+          coverage.within[n] += 100.0 / (kSide * kSide * kProbes);
+        }
+      }
+    }
+  }
+  return coverage;
+}
+
+// A plane is not normal inside a cell: with mean and std known exactly, a
+// slope along an axis is uniform (57.7 % within 1 std), a diagonal one
+// triangular (65 %), all within 2.45 std. So the numbers are printed and held
+// to a sane band.
+TEST(Adaptive, SlopingCellCoversTheDepthsInsideIt) {
+  for (const double slope : {0.02, 0.1, 0.3}) {
+    for (const double azimuth_deg : {0.0, 30.0, 45.0}) {
+      for (const int hits : {1, 3, 10, 30}) {
+        const Coverage got =
+            CoverageOnASlope(slope, azimuth_deg * 3.14159265 / 180.0, hits,
+                             static_cast<std::uint64_t>(hits));
+        std::printf(
+            "slope %.2f towards %2.0f deg, %2d hits a cell: %.1f / %.1f / "
+            "%.1f %% within 1 / 2 / 3 std\n",
+            slope, azimuth_deg, hits, got.within[0], got.within[1],
+            got.within[2]);
+        EXPECT_GT(got.within[0], 52.0);
+        EXPECT_GT(got.within[1], 90.0);
+        EXPECT_GT(got.within[2], 97.0);
+        // Not unsure without end either.
+        EXPECT_LT(got.within[0], 85.0);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace fathom::map
