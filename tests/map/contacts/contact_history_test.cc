@@ -1,0 +1,192 @@
+// The recent past of a contact, and putting stored contacts back.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <optional>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "map/contacts/contact_map.h"
+#include "tests/map/contacts/contact_testing.h"
+#include "tests/testing/status_matchers.h"
+
+namespace fathom::map {
+namespace {
+
+using ::fathom::testing::StatusIs;
+
+TEST(TrackHistory, KeepsTheNewestEstimates) {
+  TrackHistory history;
+  EXPECT_FALSE(history.NewestAtOrBefore(AtS(0)).has_value());
+  ContactPoint point;
+  for (int i = 0; i < 1000; ++i) {
+    point.time = AtS(i);
+    history.Append(point);
+    const std::size_t size = std::min<std::size_t>(
+        static_cast<std::size_t>(i) + 1, kRecentEstimates);
+    ASSERT_EQ(history.size(), size);
+    EXPECT_EQ(history.newest().time, AtS(i));
+    EXPECT_EQ(history[0].time, AtS(i + 1 - static_cast<int>(size)));
+  }
+  // 744 to 999 are kept.
+  EXPECT_FALSE(history.NewestAtOrBefore(AtS(743.5)).has_value());
+  for (int i = 744; i < 1000; ++i) {
+    const std::size_t index = static_cast<std::size_t>(i - 744);
+    EXPECT_EQ(history.NewestAtOrBefore(AtS(i)), index);
+    EXPECT_EQ(history.NewestAtOrBefore(AtS(i + 0.5)), index);
+  }
+}
+
+TEST(TrackHistory, OfSeveralAtOneTimeTheLastCounts) {
+  TrackHistory history;
+  ContactPoint point;
+  for (const double at_s : {0, 1, 1, 1, 2}) {
+    point.time = AtS(at_s);
+    history.Append(point);
+  }
+  EXPECT_EQ(history.NewestAtOrBefore(AtS(1)), 3u);
+}
+
+TEST(TrackHistory, CopiesDoNotSeeWhatComesLater) {
+  TrackHistory history;
+  ContactPoint point;
+  point.time = AtS(0);
+  history.Append(point);
+  const TrackHistory before = history;
+  point.time = AtS(1);
+  history.Append(point);
+  EXPECT_EQ(before.size(), 1u);
+  EXPECT_EQ(before.newest().time, AtS(0));
+  EXPECT_EQ(history.newest().time, AtS(1));
+}
+
+TEST(Contact, PastIsReadFromTheEstimateThen) {
+  ContactMap map(ContactMapOptions{});
+  map.Apply(Fix("a", 0, kBay, 5, 0));
+  map.Apply(Fix("a", 100, Direct(kBay, 90, 700), 0, 3));
+  const ContactsView view = map.View();
+  EXPECT_FALSE(view.At(Key("a"), AtS(-1)).has_value());
+  // 50 s on from the first: 250 m north.
+  const ContactEstimate then = *view.At(Key("a"), AtS(50));
+  EXPECT_EQ(then.x, Eigen::Vector4d(250, 0, 5, 0));
+  EXPECT_EQ(then.frame_origin, kBay);
+  EXPECT_EQ(then.report_time, AtS(0));
+  EXPECT_EQ(then.time, AtS(50));
+  // 10^2 + 50^2 * 0.5^2 + 2e-3 * 50^3 / 3 = 100 + 625 + 83.33.
+  EXPECT_NEAR(then.P(0, 0), 808.333333333333, 1e-9);
+  EXPECT_EQ(view.At(Key("a"), AtS(99.999999))->x(2), 5);
+  EXPECT_EQ(view.At(Key("a"), AtS(100))->x(3), 3);
+}
+
+TEST(Contact, PastBeyondWhatIsKeptIsPredictedBackToTheTracksStart) {
+  ContactMap map(ContactMapOptions{});
+  for (int i = 0; i < 300; ++i) {
+    map.Apply(Fix("a", 10 * i, Direct(kBay, 0, 50.0 * i), 5, 0));
+  }
+  const ContactsView view = map.View();
+  // 44 to 299 are kept; 44 was at 440 s.
+  EXPECT_EQ(view.At(Key("a"), AtS(440))->x(0), 0);
+  const ContactEstimate back = *view.At(Key("a"), AtS(400));
+  EXPECT_NEAR(back.x(0), -200, 1e-9);
+  EXPECT_NEAR(DistanceM(back.Position(), Direct(kBay, 0, 2000)), 0, 0.01);
+  // 100 + 40^2 * 0.25 + 2e-3 * 40^3 / 3: as unsure as forwards.
+  EXPECT_NEAR(back.P(0, 0), 542.666666666667, 1e-9);
+  EXPECT_EQ(back.status, ContactStatus::kActive);
+  EXPECT_TRUE(view.At(Key("a"), AtS(0)).has_value());
+  EXPECT_FALSE(view.At(Key("a"), AtS(-1)).has_value());
+}
+
+// One seeded report of a small fleet, now and then dropped, absent or false.
+ContactReport RandomReport(std::mt19937_64& random, double at_s) {
+  std::uniform_real_distribution<double> unit(0, 1);
+  const std::string name = std::to_string(static_cast<int>(20 * unit(random)));
+  const GeodeticPoint place =
+      Direct(kBay, 360 * unit(random), 30'000 * unit(random));
+  ContactReport report =
+      unit(random) < 0.2
+          ? Fix(name, at_s, place, 10 * unit(random), -10 * unit(random))
+          : Heard(name, at_s, place, 20'000 * unit(random), 360 * unit(random));
+  report.contact_class =
+      static_cast<ContactClass>(1 + static_cast<int>(6 * unit(random)));
+  if (unit(random) < 0.1) report.depth_m = 200 * unit(random);
+  report.inactive = unit(random) < 0.03;
+  return report;
+}
+
+TEST(ContactMap, RestoredContactsGoOnBitForBit) {
+  std::mt19937_64 random(42);
+  ContactMap first(ContactMapOptions{.max_contacts = 15});
+  double at_s = 0;
+  const auto feed = [&](int reports, const std::vector<ContactMap*>& maps) {
+    for (int i = 0; i < reports; ++i) {
+      at_s += i % 500 == 0 ? 2000 : 3;
+      const ContactReport report = RandomReport(random, at_s);
+      std::optional<ContactOutcome> outcome;
+      for (ContactMap* map : maps) {
+        const ContactOutcome now = map->Apply(report);
+        if (!outcome.has_value()) outcome = now;
+        EXPECT_EQ(now.applied, outcome->applied);
+        EXPECT_EQ(now.reason, outcome->reason);
+        EXPECT_EQ(now.estimate, outcome->estimate);
+      }
+    }
+  };
+  feed(7000, {&first});
+  ContactMap second(first.options());
+  first.View().ForEach([&](const Contact& contact) {
+    FATHOM_EXPECT_OK(second.Restore(contact.ToStored()));
+  });
+  EXPECT_EQ(second.View().size(), first.View().size());
+  EXPECT_EQ(second.live_count(), first.live_count());
+  feed(3000, {&first, &second});
+  // Every answer, past and future, is the same.
+  int compared = 0;
+  const ContactsView a = first.View();
+  const ContactsView b = second.View();
+  for (double t = 0; t < at_s + 5000; t += 97.3) {
+    a.ForEach([&](const Contact& contact) {
+      const auto expected = a.At(contact.key(), AtS(t));
+      EXPECT_EQ(b.At(contact.key(), AtS(t)), expected);
+      compared += expected.has_value() ? 1 : 0;
+    });
+  }
+  EXPECT_GT(compared, 1000);
+}
+
+TEST(ContactMap, RestoreRefusesWhatIsNotAContact) {
+  ContactMap source(ContactMapOptions{});
+  source.Apply(Fix("a", 0, kBay));
+  source.Apply(Fix("a", 1, kBay));
+  const StoredContact good = source.View().Find(Key("a"))->ToStored();
+  constexpr auto kInvalid = absl::StatusCode::kInvalidArgument;
+
+  ContactMap map(ContactMapOptions{.max_contacts = 1});
+  EXPECT_THAT(map.Restore({.key = Key("a"), .estimates = {}}),
+              StatusIs(kInvalid));
+  StoredContact bad = good;
+  bad.key = Key("b");
+  EXPECT_THAT(map.Restore(bad), StatusIs(kInvalid));
+  bad = good;
+  std::swap(bad.estimates[0], bad.estimates[1]);
+  EXPECT_THAT(map.Restore(bad), StatusIs(kInvalid));
+  bad = good;
+  bad.estimates[1].P(2, 3) = std::nan("");
+  EXPECT_THAT(map.Restore(bad), StatusIs(kInvalid));
+  bad = good;
+  bad.estimates[0].contact_class = static_cast<ContactClass>(0);
+  EXPECT_THAT(map.Restore(bad), StatusIs(kInvalid));
+  EXPECT_EQ(map.View().size(), 0u);
+
+  FATHOM_EXPECT_OK(map.Restore(good));
+  EXPECT_THAT(map.Restore(good), StatusIs(absl::StatusCode::kAlreadyExists));
+  StoredContact other = good;
+  other.key = Key("b");
+  for (ContactEstimate& estimate : other.estimates) estimate.key = Key("b");
+  EXPECT_THAT(map.Restore(other),
+              StatusIs(absl::StatusCode::kResourceExhausted));
+}
+
+}  // namespace
+}  // namespace fathom::map

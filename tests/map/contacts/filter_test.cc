@@ -1,0 +1,369 @@
+#include "map/contacts/filter.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "tests/testing/shared_numbers.h"
+#include "tests/testing/status_matchers.h"
+
+namespace fathom::map {
+namespace {
+
+using ::fathom::testing::LinesOf;
+using ::fathom::testing::NumbersIn;
+
+const std::string kReference = FATHOM_SHARED_DATA_DIR "/reference/";
+
+constexpr double kRadPerDeg = std::numbers::pi / 180.0;
+
+// Both axes alike and independent, [p v] with the given covariance.
+TrackState TwoAxes(double pp, double pv, double vv) {
+  TrackState state;
+  for (int axis = 0; axis < 2; ++axis) {
+    state.P(axis, axis) = pp;
+    state.P(axis, axis + 2) = state.P(axis + 2, axis) = pv;
+    state.P(axis + 2, axis + 2) = vv;
+  }
+  return state;
+}
+
+PositionMeasurement At(double north_m, double east_m, double variance_m2) {
+  return {.z = {north_m, east_m},
+          .R = Eigen::Matrix2d::Identity() * variance_m2};
+}
+
+bool IsSymmetricPositiveDefinite(const Eigen::Matrix4d& P) {
+  if (P != P.transpose()) return false;
+  return Eigen::LLT<Eigen::Matrix4d>(P).info() == Eigen::Success;
+}
+
+TEST(Filter, NamesRoundTrip) {
+  EXPECT_THAT(ParseFilter("per_axis"),
+              testing::IsOkAndHolds(FilterKind::kPerAxis));
+  EXPECT_THAT(ParseFilter("four_state"),
+              testing::IsOkAndHolds(FilterKind::kFourState));
+  EXPECT_EQ(FilterName(FilterKind::kPerAxis), "per_axis");
+  EXPECT_EQ(FilterName(FilterKind::kFourState), "four_state");
+  EXPECT_THAT(ParseFilter("ekf"),
+              testing::StatusIs(absl::StatusCode::kInvalidArgument));
+}
+
+TEST(Predict, MatchesTheSumByHand) {
+  TrackState state = TwoAxes(4, 1, 2);
+  state.x << 10, 20, 3, -1;
+  const TrackState next = Predict(state, 2.0, 3.0);
+  // p + T v: 10 + 2 * 3, 20 - 2 * 1.
+  EXPECT_EQ(next.x, Eigen::Vector4d(16, 18, 3, -1));
+  // pp + 2 T pv + T^2 vv + q T^3/3 = 4 + 4 + 8 + 8.
+  EXPECT_DOUBLE_EQ(next.P(0, 0), 24);
+  // pv + T vv + q T^2/2 = 1 + 4 + 6.
+  EXPECT_DOUBLE_EQ(next.P(0, 2), 11);
+  // vv + q T = 2 + 6.
+  EXPECT_DOUBLE_EQ(next.P(2, 2), 8);
+  EXPECT_EQ(next.P(0, 1), 0);
+  EXPECT_EQ(next.P(0, 3), 0);
+}
+
+TEST(Predict, NoiseMatchesTheReference) {
+  // stonesoup_reference.txt, "CV": T = 5, q = 0.1.
+  const TrackState next = Predict(TrackState{}, 5.0, 0.1);
+  EXPECT_NEAR(next.P(0, 0), 4.166666666666667, 1e-12);
+  EXPECT_NEAR(next.P(0, 2), 1.25, 1e-12);
+  EXPECT_NEAR(next.P(2, 2), 0.5, 1e-12);
+}
+
+TEST(Predict, TwoSpansAreTheirSum) {
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (int i = 0; i < 1000; ++i) {
+    Eigen::Matrix4d root;
+    TrackState state;
+    for (int k = 0; k < 16; ++k) root(k / 4, k % 4) = 10 * unit(random);
+    for (int k = 0; k < 4; ++k) state.x(k) = 100 * unit(random);
+    state.P = root * root.transpose();
+    state.P = (0.5 * (state.P + state.P.transpose())).eval();
+    const double t1 = 300 * std::fabs(unit(random));
+    const double t2 = 300 * std::fabs(unit(random));
+    const double q = 0.02 * std::fabs(unit(random));
+    const TrackState once = Predict(state, t1 + t2, q);
+    const TrackState twice = Predict(Predict(state, t1, q), t2, q);
+    EXPECT_LT((once.x - twice.x).norm(), 1e-12 * (1 + once.x.norm()));
+    EXPECT_LT((once.P - twice.P).norm(), 1e-12 * once.P.norm());
+  }
+}
+
+TEST(Predict, BackwardsIsNoSurerThanForwards) {
+  TrackState state = TwoAxes(4, 0, 2);
+  state.x << 10, 20, 3, -1;
+  const TrackState back = Predict(state, -2.0, 3.0);
+  EXPECT_EQ(back.x, Eigen::Vector4d(4, 22, 3, -1));
+  // 4 + 2^2 * 2 + 3 * 2^3 / 3 = 20, the same as forwards without pv.
+  EXPECT_DOUBLE_EQ(back.P(0, 0), 20);
+  EXPECT_TRUE(IsSymmetricPositiveDefinite(back.P));
+}
+
+TEST(ConvertUnbiased, MatchesEveryReferenceRow) {
+  const auto lines = LinesOf(kReference + "nrl_reference_octave.txt");
+  if (lines.empty()) GTEST_SKIP() << "no shared reference numbers";
+  int rows = 0;
+  for (const std::string& line : lines) {
+    if (line.starts_with("=== NEES")) break;
+    const std::vector<double> n = NumbersIn(line);
+    // r theta_deg sr st_deg alg x y R11 R12 R22; 3: modified unbiased.
+    if (line.starts_with("===") || n.size() != 10 || n[4] != 3) continue;
+    ++rows;
+    const PositionMeasurement got =
+        ConvertUnbiased({.range_m = n[0],
+                         .azimuth_rad = n[1] * kRadPerDeg,
+                         .range_std_m = n[2],
+                         .azimuth_std_rad = n[3] * kRadPerDeg});
+    // The table has 15 digits; its covariances were formed as differences of
+    // r^2, which leaves 1e-15 r^2 of rounding.
+    const double slack = 1e-9 * n[0];
+    EXPECT_NEAR(got.z(0), n[5], slack) << line;
+    EXPECT_NEAR(got.z(1), n[6], slack) << line;
+    const double scale = 1e-9 * (n[7] + n[9]);
+    EXPECT_NEAR(got.R(0, 0), n[7], scale) << line;
+    EXPECT_NEAR(got.R(0, 1), n[8], scale) << line;
+    EXPECT_NEAR(got.R(1, 1), n[9], scale) << line;
+    EXPECT_EQ(got.R(0, 1), got.R(1, 0));
+  }
+  EXPECT_EQ(rows, 7);
+}
+
+TEST(ConvertPlain, MatchesEveryReferenceRow) {
+  const auto lines = LinesOf(kReference + "nrl_reference_octave.txt");
+  if (lines.empty()) GTEST_SKIP() << "no shared reference numbers";
+  int rows = 0;
+  for (const std::string& line : lines) {
+    if (line.starts_with("=== NEES")) break;
+    const std::vector<double> n = NumbersIn(line);
+    if (line.starts_with("===") || n.size() != 10 || n[4] != 0) continue;
+    ++rows;
+    const PositionMeasurement got =
+        ConvertPlain({.range_m = n[0],
+                      .azimuth_rad = n[1] * kRadPerDeg,
+                      .range_std_m = n[2],
+                      .azimuth_std_rad = n[3] * kRadPerDeg});
+    EXPECT_NEAR(got.z(0), n[5], 1e-9 * n[0]) << line;
+    EXPECT_NEAR(got.z(1), n[6], 1e-9 * n[0]) << line;
+    const double scale = 1e-9 * (n[7] + n[9]);
+    EXPECT_NEAR(got.R(0, 0), n[7], scale) << line;
+    EXPECT_NEAR(got.R(0, 1), n[8], scale) << line;
+    EXPECT_NEAR(got.R(1, 1), n[9], scale) << line;
+  }
+  EXPECT_EQ(rows, 7);
+}
+
+TEST(ConvertUnbiased, MatchesTheFormulaByHand) {
+  // r = 100, a = 0, sr = 2, sa = 0.5: s = 0.25, e^-s = 0.778800783071405,
+  // e^-2s = 0.606530659712633, e^(-s/2) = 0.882496902584595.
+  const PositionMeasurement got = ConvertUnbiased({.range_m = 100,
+                                                   .azimuth_rad = 0,
+                                                   .range_std_m = 2,
+                                                   .azimuth_std_rad = 0.5});
+  EXPECT_NEAR(got.z(0), 88.2496902584595, 1e-10);
+  EXPECT_EQ(got.z(1), 0);
+  // 10004 * 1.606530659712633 / 2 - 10000 * 0.778800783071405.
+  EXPECT_NEAR(got.R(0, 0), 247.858529168542, 1e-8);
+  // 10004 * (1 - 0.606530659712633) / 2.
+  EXPECT_NEAR(got.R(1, 1), 1968.13364011741, 1e-8);
+  EXPECT_NEAR(got.R(0, 1), 0, 1e-10);
+}
+
+TEST(Update, PerAxisMatchesTheSumByHand) {
+  const TrackState prior = TwoAxes(4, 1, 2);
+  const UpdatedState got = Update(FilterKind::kPerAxis, prior, At(2, -4, 4));
+  // s = 4 + 4; k = [4/8, 1/8]; x = k z.
+  EXPECT_EQ(got.state.x, Eigen::Vector4d(1, -2, 0.25, -0.5));
+  EXPECT_DOUBLE_EQ(got.state.P(0, 0), 2);      // (1 - 0.5) 4
+  EXPECT_DOUBLE_EQ(got.state.P(0, 2), 0.5);    // (1 - 0.5) 1
+  EXPECT_DOUBLE_EQ(got.state.P(2, 2), 1.875);  // 2 - 1/8
+  EXPECT_DOUBLE_EQ(got.nis, 2 * 2 / 8. + 4 * 4 / 8.);
+}
+
+TEST(Update, PreciseMeasurementKeepsTheCovariancePositive) {
+  // Eq. 5.13 as printed, with S_z^-1: 100 - 100 * 100 / 1 = -9900. With
+  // (C P C' + S_z)^-1: 100 - 100 * 100 / 101 = 100/101.
+  const TrackState prior = TwoAxes(100, 0, 1);
+  for (const FilterKind kind : {FilterKind::kPerAxis, FilterKind::kFourState}) {
+    const UpdatedState got = Update(kind, prior, At(0, 0, 1));
+    EXPECT_NEAR(got.state.P(0, 0), 100.0 / 101.0, 1e-13);
+  }
+}
+
+TEST(Update, FollowsATargetWithoutLag) {
+  // Eq. 5.12 as printed weighs y_(k+1) against C x_k: on exact measurements
+  // of a steady target it would lag. The filter must meet it exactly.
+  for (const FilterKind kind : {FilterKind::kPerAxis, FilterKind::kFourState}) {
+    TrackState state = FirstState(At(0, 0, 1), 10);
+    for (int k = 1; k <= 200; ++k) {
+      state =
+          Update(kind, Predict(state, 10, 0), At(50.0 * k, -30.0 * k, 1)).state;
+    }
+    // The prior, v = 0 +- 10, is worth 1e-2 against sum(t^2) = 2.7e8.
+    EXPECT_NEAR(state.x(0), 10'000, 1e-4);
+    EXPECT_NEAR(state.x(2), 5, 1e-6);
+    EXPECT_NEAR(state.x(3), -3, 1e-6);
+  }
+}
+
+TEST(Update, BothFiltersAgreeWhenTheAxesAreIndependent) {
+  TrackState a = FirstState(At(10, -20, 25), 8);
+  TrackState b = a;
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> noise(0, 5);
+  for (int k = 0; k < 100; ++k) {
+    const PositionMeasurement seen = At(noise(random), noise(random), 25);
+    a = Update(FilterKind::kPerAxis, Predict(a, 3, 0.01), seen).state;
+    b = Update(FilterKind::kFourState, Predict(b, 3, 0.01), seen).state;
+    EXPECT_LT((a.x - b.x).norm(), 1e-9);
+    EXPECT_LT((a.P - b.P).norm(), 1e-9);
+  }
+}
+
+TEST(Update, MatchesTheReferenceStep) {
+  const auto lines = LinesOf(kReference + "stonesoup_reference.txt");
+  if (lines.empty()) GTEST_SKIP() << "no shared reference numbers";
+  // State order there: [x vx y vy].
+  const int order[4] = {0, 2, 1, 3};
+  const auto read = [&](const std::string& start) {
+    TrackState state;
+    for (const std::string& line : lines) {
+      if (!line.starts_with(start)) continue;
+      const std::vector<double> n = NumbersIn(line);
+      for (int r = 0; r < 4; ++r) {
+        state.x(order[r]) = n.at(static_cast<std::size_t>(r));
+        for (int c = 0; c < 4; ++c) {
+          state.P(order[r], order[c]) =
+              n.at(static_cast<std::size_t>(4 + 4 * r + c));
+        }
+      }
+    }
+    return state;
+  };
+  const TrackState prior = read("pred x");
+  const TrackState expected = read("KF x");
+  ASSERT_EQ(prior.x(0), 970);
+  // The file tells no measurement; it follows from it. R: 533.33 R /
+  // (533.33 + R) = 158.24, R = 225; z: 7.033 / 0.7033 = 10 from 970, 510.
+  const UpdatedState got =
+      Update(FilterKind::kFourState, prior, At(980, 510, 225));
+  EXPECT_LT((got.state.x - expected.x).norm(), 1e-6);
+  EXPECT_LT((got.state.P - expected.P).norm(), 1e-6);
+  // Line "NIS": 200 / 758.33.
+  EXPECT_NEAR(got.nis, 0.26373626373626374, 1e-9);
+}
+
+TEST(Update, ReachesTheSteadyStateOfTheReference) {
+  const auto lines = LinesOf(kReference + "steady_state_alpha_beta.csv");
+  if (lines.empty()) GTEST_SKIP() << "no shared reference numbers";
+  int rows = 0;
+  for (const std::string& line : lines) {
+    if (!line.starts_with("CWNA,")) continue;
+    ++rows;
+    // T q R K_pos K_vel P11 P12 P22.
+    const std::vector<double> n = NumbersIn(line);
+    for (const FilterKind kind :
+         {FilterKind::kPerAxis, FilterKind::kFourState}) {
+      TrackState state = FirstState(At(0, 0, n[2]), 10);
+      for (int k = 0; k < 2000; ++k) {
+        state = Update(kind, Predict(state, n[0], n[1]), At(0, 0, n[2])).state;
+      }
+      for (int axis = 0; axis < 2; ++axis) {
+        const double pp = state.P(axis, axis);
+        const double pv = state.P(axis, axis + 2);
+        const double vv = state.P(axis + 2, axis + 2);
+        // K = P C' R^-1 with the updated P.
+        EXPECT_NEAR(pp / n[2], n[3], 1e-6 * n[3]) << line;
+        EXPECT_NEAR(pv / n[2], n[4], 1e-6 * n[4]) << line;
+        EXPECT_NEAR(pp, n[5], 1e-6 * n[5]) << line;
+        EXPECT_NEAR(pv, n[6], 1e-6 * n[6]) << line;
+        EXPECT_NEAR(vv, n[7], 1e-6 * n[7]) << line;
+      }
+    }
+  }
+  EXPECT_EQ(rows, 4);
+}
+
+TEST(Update, CovarianceStaysPositiveDefiniteOverRandomSteps) {
+  for (const FilterKind kind : {FilterKind::kPerAxis, FilterKind::kFourState}) {
+    std::mt19937_64 random(11);
+    std::uniform_real_distribution<double> unit(0, 1);
+    TrackState state = FirstState(At(0, 0, 100), 10);
+    for (int k = 0; k < 10'000; ++k) {
+      // 1 ms to 17 minutes; ranges to 30 km; 0.5 m to 500 m; to 10 degrees.
+      const double dt_s = std::pow(10, -3 + 6 * unit(random));
+      const double q = std::pow(10, -5 + 4 * unit(random));
+      const PolarMeasurement polar{
+          .range_m = 30'000 * unit(random) + 1,
+          .azimuth_rad = 6.3 * unit(random),
+          .range_std_m = std::pow(10, -0.3 + 3 * unit(random)),
+          .azimuth_std_rad = 10 * kRadPerDeg * unit(random) + 1e-5};
+      state = Update(kind, Predict(state, dt_s, q),
+                     kind == FilterKind::kPerAxis ? ConvertPlain(polar)
+                                                  : ConvertUnbiased(polar))
+                  .state;
+      ASSERT_TRUE(state.x.allFinite()) << k;
+      ASSERT_TRUE(IsSymmetricPositiveDefinite(state.P)) << k << "\n" << state.P;
+    }
+  }
+}
+
+// A ship of the model itself, heard from a fixed place: the mean of
+// (x - truth)' P^-1 (x - truth) over 200 runs, 4 states, must lie in the 95 %
+// interval [3.6176, 4.4014] of chi^2(800)/200 (nrl_reference_octave.txt,
+// "0.95,4,200").
+TEST(Update, ErrorsAreThoseThatTheCovarianceClaims) {
+  std::mt19937_64 random(2002);
+  std::normal_distribution<double> normal;
+  constexpr double kT = 10;
+  constexpr double kQ = 2e-3;
+  constexpr double kVelocityStd = 5;
+  double nees = 0;
+  for (int run = 0; run < 200; ++run) {
+    Eigen::Vector4d truth(4000, 3000, kVelocityStd * normal(random),
+                          kVelocityStd * normal(random));
+    TrackState state;
+    for (int k = 0; k <= 30; ++k) {
+      if (k > 0) {
+        for (int axis = 0; axis < 2; ++axis) {
+          // Cholesky's factor of q [T^3/3 T^2/2; T^2/2 T].
+          const double a = normal(random);
+          const double b = normal(random);
+          const double pp = std::sqrt(kQ * kT * kT * kT / 3);
+          const double vp = kQ * kT * kT / 2 / pp;
+          truth(axis) += kT * truth(axis + 2) + pp * a;
+          truth(axis + 2) += vp * a + std::sqrt(kQ * kT - vp * vp) * b;
+        }
+      }
+      constexpr double kRangeStd = 20;
+      constexpr double kAzimuthStd = 1 * kRadPerDeg;
+      const PositionMeasurement seen =
+          ConvertUnbiased({.range_m = std::hypot(truth(0), truth(1)) +
+                                      kRangeStd * normal(random),
+                           .azimuth_rad = std::atan2(truth(1), truth(0)) +
+                                          kAzimuthStd * normal(random),
+                           .range_std_m = kRangeStd,
+                           .azimuth_std_rad = kAzimuthStd});
+      state = k == 0
+                  ? FirstState(seen, kVelocityStd)
+                  : Update(FilterKind::kFourState, Predict(state, kT, kQ), seen)
+                        .state;
+    }
+    const Eigen::Vector4d error = state.x - truth;
+    nees += error.dot(state.P.inverse() * error) / 200;
+  }
+  EXPECT_GT(nees, 3.6176);
+  EXPECT_LT(nees, 4.4014);
+}
+
+}  // namespace
+}  // namespace fathom::map
