@@ -86,17 +86,6 @@ constexpr std::uint32_t GatherBits(std::uint32_t x) {
   return x;
 }
 
-// The same for 24 bits.
-constexpr std::uint64_t SpreadBits64(std::uint64_t x) {
-  x &= 0xffffff;
-  x = (x | (x << 16)) & 0x0000ffff0000ffff;
-  x = (x | (x << 8)) & 0x00ff00ff00ff00ff;
-  x = (x | (x << 4)) & 0x0f0f0f0f0f0f0f0f;
-  x = (x | (x << 2)) & 0x3333333333333333;
-  x = (x | (x << 1)) & 0x5555555555555555;
-  return x;
-}
-
 // Z-order number of a row and a column, each below 4096.
 constexpr std::uint32_t ZOrder(std::uint32_t row, std::uint32_t col) {
   return (SpreadBits(row) << 1) | SpreadBits(col);

@@ -13,21 +13,6 @@ namespace {
 constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 constexpr double kMeanRadiusM = 6371008.8;
 
-// What of a side still counts as inside: rounding of a corner, not a metre.
-constexpr double kEdgeFraction = 1e-12;
-
-// The lattice row or column of a fraction; nullopt outside [0, 1].
-std::optional<std::uint32_t> LatticeIndex(double fraction) {
-  // Written so that NaN is outside.
-  if (!(fraction >= -kEdgeFraction && fraction <= 1 + kEdgeFraction)) {
-    return std::nullopt;
-  }
-  constexpr std::int32_t kCells = 1 << kMaxLevel;
-  const auto index =
-      static_cast<std::int32_t>(std::max(fraction, 0.0) * kCells);
-  return static_cast<std::uint32_t>(std::min(index, kCells - 1));
-}
-
 }  // namespace
 
 RootSquare::Fan RootSquare::MakeFan(const Vector3& low, const Vector3& high,
@@ -152,31 +137,8 @@ int RootSquare::LevelFor(double cell_size_m) const {
   return level;
 }
 
-std::optional<SquarePoint> RootSquare::Project(
-    const GeodeticPoint& point) const {
-  const Vector3 p = FromGeodetic(point);
-  const double rows_forward = Dot(p, rows_.forward);
-  const double cols_forward = Dot(p, cols_.forward);
-  // Written so that NaN and a default-made square give nothing.
-  if (!(rows_forward > 0 && cols_forward > 0)) return std::nullopt;
-  return SquarePoint{.u = 0.5 - std::atan(Dot(p, rows_.middle) / rows_forward) *
-                                    rows_.reciprocal_rad,
-                     .v = 0.5 + std::atan(Dot(p, cols_.middle) / cols_forward) *
-                                    cols_.reciprocal_rad};
-}
-
 GeodeticPoint RootSquare::Unproject(const SquarePoint& point) const {
   return ToGeodetic(Meet(RowPlane(point.u), ColPlane(point.v)));
-}
-
-std::optional<LatticePoint> RootSquare::LocateLattice(
-    const GeodeticPoint& point) const {
-  const std::optional<SquarePoint> place = Project(point);
-  if (!place) return std::nullopt;
-  const std::optional<std::uint32_t> row = LatticeIndex(place->u);
-  const std::optional<std::uint32_t> col = LatticeIndex(place->v);
-  if (!row || !col) return std::nullopt;
-  return LatticePoint{.row = *row, .col = *col};
 }
 
 std::optional<CellKey> RootSquare::Locate(const GeodeticPoint& point,
