@@ -1,0 +1,289 @@
+// What the mission file costs: durable pings a second, bytes a ping and a
+// leaf, and the time from a closed mission of ten million leaves to its first
+// answer. Files go to a folder of their own under the system's temporary one
+// (TMPDIR): measure on the disk that matters.
+
+#include <benchmark/benchmark.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <random>
+#include <string>
+#include <utility>
+
+#include "storage/journal_codec.h"
+#include "storage/mission_file.h"
+#include "storage/restore.h"
+#include "storage/tile_codec.h"
+#include "tests/storage/sample_records.h"
+#include "tests/storage/temp_dir.h"
+
+namespace fathom::storage {
+namespace {
+
+constexpr int kBeams = 101;
+
+// Pings of a vehicle that moves at 2 m/s over a sloping floor, no two alike.
+std::vector<JournalRecord> Pings(int count) {
+  std::mt19937 random(1);
+  std::vector<JournalRecord> records;
+  for (int i = 0; i < count; ++i) {
+    records.push_back(
+        {static_cast<std::uint64_t>(i + 1),
+         PingRecord{.source = {"sonar"},
+                    .epoch = 1,
+                    .sequence = static_cast<std::uint64_t>(i + 1),
+                    .ping = SamplePing(random, "survey", i, kBeams)}});
+  }
+  return records;
+}
+
+void SetPingCounters(benchmark::State& state, double pings, double bytes) {
+  state.counters["pings_per_s"] =
+      benchmark::Counter(pings, benchmark::Counter::kIsRate);
+  state.counters["bytes_per_ping"] = bytes / pings;
+}
+
+void BM_EncodeJournal(benchmark::State& state) {
+  const std::vector<JournalRecord> records = Pings(2000);
+  double pings = 0;
+  double bytes = 0;
+  for (auto _ : state) {
+    const auto segments = EncodeJournal(records);
+    for (const JournalSegment& segment : *segments) {
+      bytes += static_cast<double>(segment.content.size());
+    }
+    pings += static_cast<double>(records.size());
+  }
+  SetPingCounters(state, pings, bytes);
+}
+BENCHMARK(BM_EncodeJournal)->Unit(benchmark::kMillisecond);
+
+void BM_DecodeJournal(benchmark::State& state) {
+  const auto segments = EncodeJournal(Pings(2000));
+  double pings = 0;
+  for (auto _ : state) {
+    std::vector<JournalRecord> records;
+    for (const JournalSegment& segment : *segments) {
+      DecodeJournal(segment.content, "segment", records).IgnoreError();
+    }
+    pings += static_cast<double>(records.size());
+  }
+  SetPingCounters(state, pings, 0);
+}
+BENCHMARK(BM_DecodeJournal)->Unit(benchmark::kMillisecond);
+
+// Durable pings a second with so many in a transaction; real time, the log's
+// copying included. A checkpoint of an empty map every 20 000 pings trims the
+// journal, as a server's does.
+void BM_CommitPings(benchmark::State& state) {
+  const int batch_size = static_cast<int>(state.range(0));
+  const TempDir dir;
+  auto file = MissionFile::Create(dir.File("m"), SampleMetadata());
+  const auto options = OptionsOf(SampleMetadata());
+  map::ObstacleMap map(*options);
+  const std::vector<JournalRecord> pings = Pings(batch_size);
+  std::uint64_t revision = 0;
+  std::uint64_t trimmed = 0;
+  std::shared_ptr<const map::ObstacleMapView> previous;
+  Batch batch;
+  for (auto _ : state) {
+    state.PauseTiming();
+    batch.journal = pings;
+    for (JournalRecord& record : batch.journal) {
+      record.revision = ++revision;
+      std::get<PingRecord>(record.event).sequence = revision;
+    }
+    batch.checkpoint.reset();
+    if (revision - trimmed >= 20'000) {
+      trimmed = revision;
+      map.AdvanceRevision(revision);
+      batch.checkpoint = Checkpoint{.now = map.View(), .previous = previous};
+    }
+    state.ResumeTiming();
+    const absl::Status status = (*file)->Commit(batch);
+    if (!status.ok()) {
+      state.SkipWithError(status.ToString().c_str());
+      break;
+    }
+    if (batch.checkpoint.has_value()) previous = batch.checkpoint->now;
+  }
+  SetPingCounters(state, static_cast<double>(revision), 0);
+  state.counters["wal_mib"] =
+      static_cast<double>((*file)->Status().wal_bytes) / 1048576;
+  state.counters["file_mib"] =
+      static_cast<double>((*file)->Status().file_bytes) / 1048576;
+}
+BENCHMARK(BM_CommitPings)
+    ->Arg(1)
+    ->Arg(10)
+    ->Arg(100)
+    ->Arg(1000)
+    ->Arg(4000)
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
+
+// Durable contact reports a second, history rows included, 1000 a transaction
+// over 100 contacts.
+void BM_CommitContacts(benchmark::State& state) {
+  const TempDir dir;
+  auto file = MissionFile::Create(dir.File("m"), SampleMetadata());
+  std::uint64_t revision = 0;
+  for (auto _ : state) {
+    state.PauseTiming();
+    Batch batch;
+    for (int i = 0; i < 1000; ++i) {
+      ++revision;
+      ContactHistoryRow row{.revision = revision, .estimate = {}};
+      static_cast<map::ContactPoint&>(row.estimate) = SampleContactPoint(1);
+      row.estimate.frame_origin = {.latitude_deg = 41, .longitude_deg = -70};
+      row.estimate.time = TimeFromUnixMicros(static_cast<int>(revision));
+      row.estimate.key = {.source = {"ais"},
+                          .contact = {std::to_string(i % 100)}};
+      batch.journal.push_back(
+          {revision,
+           ContactRecord{.epoch = 1,
+                         .sequence = revision,
+                         .report = SampleReport(i, std::to_string(i % 100))}});
+      batch.contact_history.push_back(std::move(row));
+    }
+    state.ResumeTiming();
+    const absl::Status status = (*file)->Commit(batch);
+    if (!status.ok()) state.SkipWithError(status.ToString().c_str());
+  }
+  state.counters["reports_per_s"] = benchmark::Counter(
+      static_cast<double>(revision), benchmark::Counter::kIsRate);
+}
+BENCHMARK(BM_CommitContacts)->UseRealTime()->Unit(benchmark::kMillisecond);
+
+// A block of a local map, all cells measured a few times.
+void BM_EncodeBlock(benchmark::State& state) {
+  std::mt19937 random(1);
+  std::normal_distribution<float> noise(0.0f, 0.3f);
+  map::LocalBlock block;
+  for (std::size_t k = 0; k < map::kBlockCells; ++k) {
+    const float depth_m = 20.0f + 0.05f * static_cast<float>(k % 16);
+    for (std::uint32_t hit = 0; hit < 1 + k % 5; ++hit) {
+      block.evidence[k].Add(depth_m + noise(random), 0.3f, 1'000'000'000 + hit);
+    }
+  }
+  const BlockKey key{.activity_number = 1, .index = {}};
+  double bytes = 0;
+  for (auto _ : state) {
+    bytes = static_cast<double>(EncodeBlock(key, block).size());
+  }
+  state.counters["bytes_per_cell"] = bytes / map::kBlockCells;
+}
+BENCHMARK(BM_EncodeBlock)->Unit(benchmark::kMicrosecond);
+
+// A square of 40.5 km whose finest cells are 9.9 m: 4096 x 4096.
+MissionMetadata LargeMission() {
+  MissionMetadata metadata = SampleMetadata();
+  metadata.root_south_west = {.latitude_deg = 41.3, .longitude_deg = -71.0};
+  metadata.root_north_west = {.latitude_deg = 41.3 + 0.3650,
+                              .longitude_deg = -71.0};
+  return metadata;
+}
+
+// A chart of near ten million cells of 10 m on that square: hills of 50 m,
+// ripples of half a metre and 5 cm of noise, so that nothing conglomerates and
+// no two means are alike.
+map::RasterBlock LargeChart() {
+  constexpr std::uint32_t kSide = 3170;
+  std::mt19937 random(3);
+  std::normal_distribution<float> noise(0.0f, 0.05f);
+  map::RasterBlock block;
+  block.north_west = {.latitude_deg = 41.3 + 0.33, .longitude_deg = -70.95};
+  block.latitude_step_deg = 10.0 / 111'000;
+  block.longitude_step_deg = 10.0 / 83'300;
+  block.rows = kSide;
+  block.columns = kSide;
+  block.std_m.reserve(std::size_t{kSide} * kSide);
+  for (std::uint32_t row = 0; row < kSide; ++row) {
+    for (std::uint32_t col = 0; col < kSide; ++col) {
+      const float north = static_cast<float>(row) / 300.0f;
+      const float east = static_cast<float>(col) / 200.0f;
+      block.depth_m.push_back(60.0f + 25.0f * std::sin(north) * std::cos(east) +
+                              0.5f * std::sin(20 * east) + noise(random));
+      block.std_m.push_back(0.3f + 0.01f * std::abs(std::sin(30 * north)));
+    }
+  }
+  block.time_s = 1'000'000'000;
+  return block;
+}
+
+// The mission file of the benchmark below, made once.
+class LargeFile {
+ public:
+  LargeFile() {
+    const auto options = OptionsOf(LargeMission());
+    map::ObstacleMap map(*options);
+    const auto imported = map.Import(LargeChart(), false);
+    if (!imported.ok()) std::abort();
+    leaves_ = map.View()->global().leaf_count();
+    auto file = MissionFile::Create(path(), LargeMission());
+    Batch batch;
+    batch.checkpoint = Checkpoint{.now = map.View(), .previous = nullptr};
+    const auto start = std::chrono::steady_clock::now();
+    if (!file.ok() || !(*file)->Commit(batch).ok()) std::abort();
+    write_s_ =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start)
+            .count();
+    if (!(*file)->Close().ok()) std::abort();
+    bytes_ = std::filesystem::file_size(path());
+  }
+
+  std::string path() const { return dir_.File("m"); }
+  double leaves() const { return static_cast<double>(leaves_); }
+  double bytes() const { return static_cast<double>(bytes_); }
+  double write_s() const { return write_s_; }
+
+ private:
+  TempDir dir_;
+  std::uint64_t leaves_ = 0;
+  std::uint64_t bytes_ = 0;
+  double write_s_ = 0;
+};
+
+// From the closed file to the first answer (the file is in the page cache).
+void BM_Open10MLeaves(benchmark::State& state) {
+  static const LargeFile large;
+  double seconds = 0;
+  double load_s = 0;
+  for (auto _ : state) {
+    const auto start = std::chrono::steady_clock::now();
+    auto file = MissionFile::Open(large.path());
+    auto loaded = (*file)->Load();
+    if (!loaded.ok()) std::abort();
+    const auto read = std::chrono::steady_clock::now();
+    const auto options = OptionsOf(loaded->metadata);
+    auto restored = RestoreMap(*std::move(loaded), *options);
+    if (!restored.ok()) std::abort();
+    const auto answer = restored->map->View()->SeabedAt(
+        {.latitude_deg = 41.5, .longitude_deg = -70.8});
+    if (!answer.has_value()) std::abort();
+    const auto end = std::chrono::steady_clock::now();
+    load_s += std::chrono::duration<double>(read - start).count();
+    seconds += std::chrono::duration<double>(end - start).count();
+    state.PauseTiming();
+    restored->map.reset();
+    restored->checkpoint.reset();
+    file->reset();
+    state.ResumeTiming();
+  }
+  const double rounds = static_cast<double>(state.iterations());
+  state.counters["seconds"] = seconds / rounds;
+  state.counters["load_s"] = load_s / rounds;
+  state.counters["leaves"] = large.leaves();
+  state.counters["disk_bytes_per_leaf"] = large.bytes() / large.leaves();
+  state.counters["write_s"] = large.write_s();
+}
+BENCHMARK(BM_Open10MLeaves)->UseRealTime()->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace fathom::storage
