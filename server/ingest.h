@@ -5,6 +5,7 @@
 #ifndef FATHOM_SERVER_INGEST_H_
 #define FATHOM_SERVER_INGEST_H_
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <variant>
@@ -67,9 +68,9 @@ class IngestListener {
   // that shows it is published. Called in the order of submission.
   virtual void OnApplied(const MessageOutcome& outcome) = 0;
 
-  // All messages up to this one survive a power cut. Called in order, once
-  // for each group commit that held any of this listener's messages.
-  virtual void OnDurable(MessageNumber newest) = 0;
+  // `count` further messages, `newest` the last of them, survive a power cut.
+  // Called in order, once for each group commit that held any of them.
+  virtual void OnDurable(MessageNumber newest, size_t count) = 0;
 
   // There is room again after Submit said Room::kNone.
   virtual void OnRoom() = 0;

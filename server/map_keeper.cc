@@ -216,14 +216,15 @@ void MapKeeper::Transfer(map::ActivityId id, Done<map::TransferResult> done) {
 }
 
 void MapKeeper::DropContact(map::DropContact event, Done<Nothing> done) {
-  Enqueue(std::move(done),
-          [this, event = std::move(event)](
-              StorageItem& item) -> absl::StatusOr<Nothing> {
-            FATHOM_ASSIGN_OR_RETURN(map::ContactOutcome outcome, map_->Drop(event));
-    item.record = storage::JournalRecord{map_->revision(), event};
-    item.contact_estimate = std::move(outcome.estimate);
-    return Nothing{};
-          });
+  Enqueue(
+      std::move(done),
+      [this,
+       event = std::move(event)](StorageItem& item) -> absl::StatusOr<Nothing> {
+        FATHOM_ASSIGN_OR_RETURN(map::ContactOutcome outcome, map_->Drop(event));
+        item.record = storage::JournalRecord{map_->revision(), event};
+        item.contact_estimate = std::move(outcome.estimate);
+        return Nothing{};
+      });
 }
 
 void MapKeeper::Import(map::RasterBlock block, bool last,
@@ -237,6 +238,14 @@ void MapKeeper::Import(map::RasterBlock block, bool last,
             if (result.ok() && last) item.checkpoint = Publish();
             item.done_when_applied = !last;
             return result;
+          });
+}
+
+void MapKeeper::Checkpoint(Done<Nothing> done) {
+  Enqueue(std::move(done),
+          [this](StorageItem& item) -> absl::StatusOr<Nothing> {
+            item.checkpoint = Publish();
+            return Nothing{};
           });
 }
 
@@ -549,25 +558,35 @@ void MapKeeper::TellDurable(std::vector<StorageItem>& items) {
   size_t messages = 0;
   size_t bytes = 0;
   size_t commands = 0;
-  // Newest number of each listener, in the order of first appearance; few.
-  std::vector<std::pair<std::shared_ptr<IngestListener>, MessageNumber>> newest;
+  // One a listener, in the order of first appearance; few.
+  struct Durable {
+    std::shared_ptr<IngestListener> listener;
+    MessageNumber newest;
+    size_t count = 0;
+  };
+  std::vector<Durable> durable;
   for (StorageItem& item : items) {
     if (item.listener != nullptr) {
       messages += 1;
       bytes += item.bytes;
-      auto found = std::find_if(
-          newest.begin(), newest.end(),
-          [&](const auto& entry) { return entry.first == item.listener; });
-      if (found == newest.end()) {
-        newest.emplace_back(std::move(item.listener), item.number);
-      } else {
-        found->second = item.number;
+      auto found = std::find_if(durable.begin(), durable.end(),
+                                [&](const Durable& entry) {
+                                  return entry.listener == item.listener;
+                                });
+      if (found == durable.end()) {
+        found = durable.insert(found, {.listener = std::move(item.listener),
+                                       .newest = item.number,
+                                       .count = 0});
       }
+      found->newest = item.number;
+      found->count += 1;
     } else if (item.done) {
       commands += 1;
     }
   }
-  for (const auto& [listener, number] : newest) listener->OnDurable(number);
+  for (const Durable& entry : durable) {
+    entry.listener->OnDurable(entry.newest, entry.count);
+  }
   for (const StorageItem& item : items) {
     if (item.done) item.done(absl::OkStatus());
   }

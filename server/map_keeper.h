@@ -156,6 +156,12 @@ class MapKeeper {
   // One block of a chart. Only the `last` is durable when `done` runs, and
   // with it all before it; the others tell when they are applied.
   void Import(map::RasterBlock block, bool last, Done<map::ImportResult> done);
+  // Makes durable what a broken-off import has left in the map.
+  void Checkpoint(Done<Nothing> done);
+
+  // Tells all who wait for a revision that it does not come.
+  void StopWaiting() { gate_.Close(); }
+
   // Takes nothing new, applies and commits what waits, makes a last
   // checkpoint, ends the threads. Returns whether everything is durable.
   // Errors: the storage fault that stands in the way. Idempotent.

@@ -1,0 +1,188 @@
+#include "server/mission_service.h"
+
+#include <chrono>
+#include <functional>
+#include <utility>
+
+#include "server/convert_common.h"
+#include "server/convert_mission.h"
+#include "server/field_checks.h"
+#include "server/import_call.h"
+
+namespace fathom::server {
+namespace {
+
+grpc::ServerUnaryReactor* Reply(grpc::CallbackServerContext* call,
+                                const absl::Status& status) {
+  grpc::ServerUnaryReactor* reactor = call->DefaultReactor();
+  reactor->Finish(ToGrpc(status));
+  return reactor;
+}
+
+// A `done` for the keeper that answers the call: `write` fills the response
+// from the result. The answer is sent by the courier.
+template <typename Result, typename Write>
+Done<Result> Answer(ServerContext& context, grpc::ServerUnaryReactor* reactor,
+                    Write write) {
+  return [&context, reactor, write](absl::StatusOr<Applied<Result>> applied) {
+    if (applied.ok()) write(*applied);
+    context.courier.Give([&context, reactor, status = applied.status()] {
+      reactor->Finish(ToGrpc(KeeperError(context, status)));
+    });
+  };
+}
+
+absl::Status CheckActivityId(const std::string& id) {
+  const FieldPath root;
+  return CheckId(id, FieldPath(root, "activity_id"));
+}
+
+double SecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start)
+      .count();
+}
+
+}  // namespace
+
+grpc::ServerUnaryReactor* MissionService::StartActivity(
+    grpc::CallbackServerContext* call, const v1::StartActivityRequest* request,
+    v1::StartActivityResponse* response) {
+  auto event = ConvertStart(*request, context_.clock.Now());
+  if (!event.ok()) return Reply(call, event.status());
+  grpc::ServerUnaryReactor* reactor = call->DefaultReactor();
+  const map::ActivityId id = event->id;
+  context_.keeper.StartActivity(
+      *std::move(event),
+      Answer<Nothing>(context_, reactor,
+                      [this, id, response](const Applied<Nothing>& applied) {
+                        response->set_map_revision(applied.revision);
+                        const auto view = context_.keeper.View();
+                        if (const auto* activity = view->FindActivity(id)) {
+                          WriteActivity(*activity,
+                                        response->mutable_activity());
+                        }
+                      }));
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* MissionService::CompleteActivity(
+    grpc::CallbackServerContext* call,
+    const v1::CompleteActivityRequest* request,
+    v1::CompleteActivityResponse* response) {
+  const absl::Status checked = CheckActivityId(request->activity_id());
+  if (!checked.ok()) return Reply(call, checked);
+  grpc::ServerUnaryReactor* reactor = call->DefaultReactor();
+  const auto start = std::chrono::steady_clock::now();
+  context_.keeper.CompleteActivity(
+      {request->activity_id()}, request->discard(),
+      Answer<map::TransferResult>(
+          context_, reactor,
+          [start, response](const Applied<map::TransferResult>& applied) {
+            WriteTransfer(applied.result, SecondsSince(start),
+                          response->mutable_transfer());
+            response->set_map_revision(applied.revision);
+          }));
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* MissionService::TransferLocalMap(
+    grpc::CallbackServerContext* call,
+    const v1::TransferLocalMapRequest* request,
+    v1::TransferLocalMapResponse* response) {
+  const absl::Status checked = CheckActivityId(request->activity_id());
+  if (!checked.ok()) return Reply(call, checked);
+  grpc::ServerUnaryReactor* reactor = call->DefaultReactor();
+  const auto start = std::chrono::steady_clock::now();
+  context_.keeper.Transfer(
+      {request->activity_id()},
+      Answer<map::TransferResult>(
+          context_, reactor,
+          [start, response](const Applied<map::TransferResult>& applied) {
+            WriteTransfer(applied.result, SecondsSince(start),
+                          response->mutable_transfer());
+            response->set_map_revision(applied.revision);
+          }));
+  return reactor;
+}
+
+grpc::ServerReadReactor<v1::ImportPriorRequest>* MissionService::ImportPrior(
+    grpc::CallbackServerContext*, v1::ImportPriorResponse* response) {
+  return ImportCall::Start(context_, response);
+}
+
+grpc::ServerUnaryReactor* MissionService::GetMissionStatus(
+    grpc::CallbackServerContext* call,
+    const v1::GetMissionStatusRequest* request,
+    v1::GetMissionStatusResponse* response) {
+  const storage::MissionMetadata& metadata = context_.file.metadata();
+  const auto view = context_.keeper.View();
+  response->set_mission_id(metadata.mission_id);
+  response->set_name(metadata.name);
+  response->set_vertical_datum(metadata.vertical_datum);
+  WriteTime(metadata.created, response->mutable_created_time());
+  response->set_server_version(FATHOM_VERSION);
+  WriteStamp(*view, response->mutable_stamp());
+  response->set_uptime_s(SecondsSince(context_.start));
+  if (request->with_digest()) response->set_map_digest(view->Digest());
+  WriteActivities(*view, response->mutable_activities());
+
+  v1::GlobalMapStatus* global = response->mutable_global_map();
+  const map::GlobalMapView& map = view->global();
+  const map::RootSquare& root = map.root();
+  WritePoint(root.south_west(), global->mutable_south_west());
+  WritePoint(root.north_west(), global->mutable_north_west());
+  global->set_max_level(static_cast<uint32_t>(root.max_level()));
+  global->set_min_cell_m(root.cell_size_m(root.max_level()));
+  global->set_leaves(map.known_leaf_count());
+  global->set_max_cells(metadata.max_cells);
+  global->set_memory_bytes(map.memory_bytes());
+  global->set_tolerance_m(metadata.tolerance_m);
+
+  v1::ContactListStatus* contacts = response->mutable_contacts();
+  contacts->set_live(view->contacts().live_count());
+  contacts->set_dropped(view->contacts().size() -
+                        view->contacts().live_count());
+  contacts->set_max_contacts(metadata.max_contacts);
+  WriteRejects(context_.keeper.contact_rejects(), contacts->mutable_rejects());
+  WriteContactClasses(view->contacts().classes(), contacts);
+
+  v1::StorageStatus* storage = response->mutable_storage();
+  const storage::MissionFileStatus file = context_.file.Status();
+  const StorageState state = context_.keeper.storage_state();
+  storage->set_file_bytes(file.file_bytes);
+  storage->set_wal_bytes(file.wal_bytes);
+  storage->set_journal_records(state.journal_records);
+  storage->set_durable_revision(state.durable_revision);
+  storage->set_fault(state.fault);
+  WriteLimits(response->mutable_limits());
+  return Reply(call, absl::OkStatus());
+}
+
+grpc::ServerUnaryReactor* MissionService::DropContact(
+    grpc::CallbackServerContext* call, const v1::DropContactRequest* request,
+    v1::DropContactResponse* response) {
+  auto event = ConvertDrop(*request, context_.clock.Now());
+  if (!event.ok()) return Reply(call, event.status());
+  grpc::ServerUnaryReactor* reactor = call->DefaultReactor();
+  context_.keeper.DropContact(
+      *std::move(event),
+      Answer<Nothing>(context_, reactor,
+                      [response](const Applied<Nothing>& applied) {
+                        response->set_map_revision(applied.revision);
+                      }));
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* MissionService::SaveMission(
+    grpc::CallbackServerContext* call, const v1::SaveMissionRequest*,
+    v1::SaveMissionResponse*) {
+  return Reply(call, NotYet("SaveMission"));
+}
+
+grpc::ServerUnaryReactor* MissionService::VerifyMission(
+    grpc::CallbackServerContext* call, const v1::VerifyMissionRequest*,
+    v1::VerifyMissionResponse*) {
+  return Reply(call, NotYet("VerifyMission"));
+}
+
+}  // namespace fathom::server

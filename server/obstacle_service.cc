@@ -1,0 +1,257 @@
+#include "server/obstacle_service.h"
+
+#include <deque>
+#include <memory>
+#include <utility>
+
+#include "base/status_macros.h"
+#include "server/convert_common.h"
+#include "server/convert_query.h"
+#include "server/field_checks.h"
+#include "server/region.h"
+
+namespace fathom::server {
+namespace {
+
+using ViewPtr = std::shared_ptr<const map::ObstacleMapView>;
+
+grpc::ServerUnaryReactor* Reply(grpc::CallbackServerContext* call,
+                                const absl::Status& status) {
+  grpc::ServerUnaryReactor* reactor = call->DefaultReactor();
+  reactor->Finish(ToGrpc(status));
+  return reactor;
+}
+
+// A server stream that ends at once with an error.
+template <typename Response>
+class FailedStream final : public grpc::ServerWriteReactor<Response> {
+ public:
+  explicit FailedStream(const absl::Status& status) {
+    this->Finish(ToGrpc(status));
+  }
+  void OnDone() override { delete this; }
+};
+
+// Writes one block of a region after the other, as fast as the client reads.
+class RegionStream final
+    : public grpc::ServerWriteReactor<v1::GetRegionResponse> {
+ public:
+  explicit RegionStream(Region region) : region_(std::move(region)) {}
+
+  void Begin(const absl::Status& status, ViewPtr view) {
+    const absl::Status opened =
+        status.ok() ? region_.Open(std::move(view)) : status;
+    if (!opened.ok()) {
+      Finish(ToGrpc(opened));
+      return;
+    }
+    WriteNext();
+  }
+  void OnWriteDone(bool ok) override {
+    if (!ok) {
+      Finish(grpc::Status(grpc::StatusCode::CANCELLED, "the client has gone"));
+      return;
+    }
+    WriteNext();
+  }
+  void OnDone() override { delete this; }
+
+ private:
+  void WriteNext() {
+    if (region_.Next(&response_)) {
+      StartWrite(&response_);
+    } else {
+      Finish(grpc::Status::OK);
+    }
+  }
+
+  Region region_;
+  v1::GetRegionResponse response_;
+};
+
+// Writes messages that are there already.
+class HistoryStream final
+    : public grpc::ServerWriteReactor<v1::GetContactHistoryResponse> {
+ public:
+  explicit HistoryStream(std::deque<v1::GetContactHistoryResponse> messages)
+      : messages_(std::move(messages)) {
+    WriteNext();
+  }
+  void OnWriteDone(bool ok) override {
+    messages_.pop_front();
+    if (!ok) messages_.clear();
+    WriteNext();
+  }
+  void OnDone() override { delete this; }
+
+ private:
+  void WriteNext() {
+    if (messages_.empty()) {
+      Finish(grpc::Status::OK);
+    } else {
+      StartWrite(&messages_.front());
+    }
+  }
+
+  std::deque<v1::GetContactHistoryResponse> messages_;
+};
+
+absl::StatusOr<std::deque<v1::GetContactHistoryResponse>> ReadHistory(
+    storage::MissionFile& file, const v1::GetContactHistoryRequest& request) {
+  const FieldPath root;
+  FATHOM_RETURN_IF_ERROR(
+      CheckId(request.source_id(), FieldPath(root, "source_id")));
+  FATHOM_RETURN_IF_ERROR(CheckId(request.contact_id(),
+                                 FieldPath(root, "contact_id"),
+                                 /*allow_colon=*/true));
+  Time from = Time::min();
+  Time to = Time::max();
+  if (request.has_start_time()) {
+    FATHOM_ASSIGN_OR_RETURN(
+        from, CheckTime(request.start_time(), FieldPath(root, "start_time")));
+  }
+  const FieldPath end_path(root, "end_time");
+  if (request.has_end_time()) {
+    FATHOM_ASSIGN_OR_RETURN(to, CheckTime(request.end_time(), end_path));
+    if (to < from) {
+      return InvalidField(end_path.ToString(), "is before start_time");
+    }
+  }
+  const map::ContactKey key = {.source = {request.source_id()},
+                               .contact = {request.contact_id()}};
+  std::deque<v1::GetContactHistoryResponse> messages;
+  size_t count = 0;
+  const absl::Status read = file.ReadContactHistory(
+      key, from, to, [&](const storage::ContactHistoryRow& row) {
+        if (count == kMaxHistoryEstimates) {
+          count += 1;
+          return false;
+        }
+        if (count % kHistoryEstimatesPerMessage == 0) messages.emplace_back();
+        count += 1;
+        WriteContact(row.estimate, messages.back().add_estimates());
+        return true;
+      });
+  if (absl::IsNotFound(read)) {
+    return NoSuchContact(request.source_id(), request.contact_id());
+  }
+  FATHOM_RETURN_IF_ERROR(read);
+  if (count > kMaxHistoryEstimates) {
+    return LimitExceeded("estimates between start_time and end_time", count,
+                         kMaxHistoryEstimates);
+  }
+  return messages;
+}
+
+}  // namespace
+
+grpc::ServerUnaryReactor* ObstacleService::QueryObstacle(
+    grpc::CallbackServerContext* call, const v1::QueryObstacleRequest* request,
+    v1::QueryObstacleResponse* response) {
+  absl::StatusOr<map::ObstacleQuery> query =
+      ConvertQuery(*request, context_.clock.Now());
+  if (!query.ok()) return Reply(call, query.status());
+  grpc::ServerUnaryReactor* reactor = call->DefaultReactor();
+  AtRevision(context_, *call, request->min_revision(),
+             [reactor, response, query = *query](const absl::Status& status,
+                                                 const ViewPtr& view) {
+               if (status.ok()) {
+                 WriteAnswer(view->Answer(query), response->mutable_answer());
+                 WriteStamp(*view, response->mutable_stamp());
+               }
+               reactor->Finish(ToGrpc(status));
+             });
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* ObstacleService::QueryObstacles(
+    grpc::CallbackServerContext* call, const v1::QueryObstaclesRequest* request,
+    v1::QueryObstaclesResponse* response) {
+  const Time now = context_.clock.Now();
+  if (request->min_revision() > 0) {
+    // A request that will be refused must not wait first.
+    const absl::Status checked = CheckBatch(*request);
+    if (!checked.ok()) return Reply(call, checked);
+  }
+  grpc::ServerUnaryReactor* reactor = call->DefaultReactor();
+  AtRevision(context_, *call, request->min_revision(),
+             [reactor, request, response, now](const absl::Status& status,
+                                               const ViewPtr& view) {
+               reactor->Finish(ToGrpc(
+                   status.ok() ? AnswerBatch(*request, now, *view, response)
+                               : status));
+             });
+  return reactor;
+}
+
+grpc::ServerWriteReactor<v1::GetRegionResponse>* ObstacleService::GetRegion(
+    grpc::CallbackServerContext* call, const v1::GetRegionRequest* request) {
+  absl::StatusOr<Region> region =
+      Region::Create(*request, context_.clock.Now());
+  if (!region.ok()) {
+    return new FailedStream<v1::GetRegionResponse>(region.status());
+  }
+  auto* stream = new RegionStream(*std::move(region));
+  AtRevision(context_, *call, request->min_revision(),
+             [stream](const absl::Status& status, const ViewPtr& view) {
+               stream->Begin(status, view);
+             });
+  return stream;
+}
+
+grpc::ServerUnaryReactor* ObstacleService::ListContacts(
+    grpc::CallbackServerContext* call, const v1::ListContactsRequest* request,
+    v1::ListContactsResponse* response) {
+  Time time = context_.clock.Now();
+  if (request->has_time()) {
+    const FieldPath root;
+    const auto checked = CheckTime(request->time(), FieldPath(root, "time"));
+    if (!checked.ok()) return Reply(call, checked.status());
+    time = *checked;
+  }
+  fathom::server::ListContacts(*context_.keeper.View(), time,
+                               request->include_inactive(), response);
+  return Reply(call, absl::OkStatus());
+}
+
+grpc::ServerWriteReactor<v1::GetContactHistoryResponse>*
+ObstacleService::GetContactHistory(
+    grpc::CallbackServerContext*, const v1::GetContactHistoryRequest* request) {
+  auto messages = ReadHistory(context_.file, *request);
+  if (!messages.ok()) {
+    return new FailedStream<v1::GetContactHistoryResponse>(messages.status());
+  }
+  return new HistoryStream(*std::move(messages));
+}
+
+grpc::ServerUnaryReactor* ObstacleService::CheckTrajectory(
+    grpc::CallbackServerContext* call, const v1::CheckTrajectoryRequest*,
+    v1::CheckTrajectoryResponse*) {
+  return Reply(call, NotYet("CheckTrajectory"));
+}
+
+grpc::ServerUnaryReactor* ObstacleService::FindNearestObstacle(
+    grpc::CallbackServerContext* call, const v1::FindNearestObstacleRequest*,
+    v1::FindNearestObstacleResponse*) {
+  return Reply(call, NotYet("FindNearestObstacle"));
+}
+
+grpc::ServerWriteReactor<v1::WatchRegionResponse>* ObstacleService::WatchRegion(
+    grpc::CallbackServerContext*, const v1::WatchRegionRequest*) {
+  return new FailedStream<v1::WatchRegionResponse>(NotYet("WatchRegion"));
+}
+
+grpc::ServerWriteReactor<v1::WatchContactsResponse>*
+ObstacleService::WatchContacts(grpc::CallbackServerContext*,
+                               const v1::WatchContactsRequest*) {
+  return new FailedStream<v1::WatchContactsResponse>(NotYet("WatchContacts"));
+}
+
+grpc::ServerWriteReactor<v1::WatchTrajectoryResponse>*
+ObstacleService::WatchTrajectory(grpc::CallbackServerContext*,
+                                 const v1::WatchTrajectoryRequest*) {
+  return new FailedStream<v1::WatchTrajectoryResponse>(
+      NotYet("WatchTrajectory"));
+}
+
+}  // namespace fathom::server

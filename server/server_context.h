@@ -1,0 +1,86 @@
+// What the services share: the keeper, the file (for history and sizes), the
+// clock and the bookkeeping of calls. No logic; lives as long as the server.
+
+#ifndef FATHOM_SERVER_SERVER_CONTEXT_H_
+#define FATHOM_SERVER_SERVER_CONTEXT_H_
+
+#include <atomic>
+#include <chrono>
+#include <utility>
+
+#include "base/clock.h"
+#include "grpcpp/server_context.h"
+#include "grpcpp/support/server_callback.h"
+#include "server/call_registry.h"
+#include "server/courier.h"
+#include "server/errors.h"
+#include "server/limits.h"
+#include "server/map_keeper.h"
+#include "storage/mission_file.h"
+
+namespace fathom::server {
+
+// See file comment.
+struct ServerContext {
+  MapKeeper& keeper;
+  storage::MissionFile& file;
+  const Clock& clock;
+  Courier courier{};
+  CallRegistry ingest_calls{kMaxIngestStreams};
+  CallRegistry import_calls{kMaxImports};
+  std::atomic<bool> draining{false};
+  const std::chrono::steady_clock::time_point start =
+      std::chrono::steady_clock::now();
+};
+
+// The named error for a status that the keeper (not the map) gave.
+inline absl::Status KeeperError(const ServerContext& context,
+                                const absl::Status& status) {
+  switch (status.code()) {
+    case absl::StatusCode::kUnavailable:
+      return ShuttingDown();
+    case absl::StatusCode::kAborted:
+      return QueueFull();
+    case absl::StatusCode::kResourceExhausted: {
+      const std::string fault = context.keeper.storage_state().fault;
+      return fault.empty() ? status : StorageFull(fault);
+    }
+    default:
+      return status;
+  }
+}
+
+// When a wait for a revision gives up: shortly before the client's deadline.
+inline RevisionGate::Deadline WaitDeadline(
+    const grpc::CallbackServerContext& call) {
+  const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
+      call.deadline() - std::chrono::system_clock::now());
+  const auto wait = std::min(left - kRevisionWaitMargin, kMaxRevisionWait);
+  return std::chrono::steady_clock::now() + wait;
+}
+
+// Runs `then(view)` once the map holds `min_revision`, or with the error why
+// it does not. At once, on this thread, if it holds it already.
+template <typename Then>
+void AtRevision(ServerContext& context, const grpc::CallbackServerContext& call,
+                uint64_t min_revision, Then then) {
+  auto view = context.keeper.View();
+  if (view->revision() >= min_revision) {
+    then(absl::OkStatus(), std::move(view));
+    return;
+  }
+  auto wake = [&context, min_revision, then](bool reached) {
+    auto newest = context.keeper.View();
+    then(reached ? absl::OkStatus()
+                 : RevisionNotReached(min_revision, newest->revision()),
+         newest);
+  };
+  if (!context.keeper.WaitForRevision(min_revision, WaitDeadline(call), wake)) {
+    then(TooManyCalls("waits for min_revision", kMaxRevisionWaiters),
+         std::move(view));
+  }
+}
+
+}  // namespace fathom::server
+
+#endif  // FATHOM_SERVER_SERVER_CONTEXT_H_
