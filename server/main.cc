@@ -1,0 +1,270 @@
+// fathomd: the obstacle-map server. Opens (or makes) a mission file, serves it
+// until SIGTERM or SIGINT, and leaves it closed cleanly.
+//
+// Exit codes: 0 stopped as asked; 1 could not start, or the mission file
+// failed while serving (the reason is the last line on standard error); 2
+// flags that make no sense.
+
+#include <pthread.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "absl/strings/str_format.h"
+#include "base/clock.h"
+#include "base/log.h"
+#include "base/status_macros.h"
+#include "server/map_keeper.h"
+#include "server/mission.h"
+#include "server/mission_store.h"
+#include "server/server.h"
+#include "server/server_context.h"
+#include "storage/mission_file.h"
+
+namespace fathom::server {
+namespace {
+
+constexpr double kMetresPerNmi = 1852;  // Exact, by definition.
+
+constexpr char kAbout[] =
+    R"(fathomd serves one mission's obstacle map over gRPC (package fathom.v1).
+
+It fuses sonar pings and contact reports, keeps the map in one mission file
+and answers "is there an obstacle at this place, time and confidence?".
+
+  Make a mission of 20 x 20 nautical miles and serve it on a free port:
+    fathomd --mission bay.fathom --create --center 41.5,-71.4 --side-nmi 20 \
+            --listen 127.0.0.1:0
+
+  Serve it again later:
+    fathomd --mission bay.fathom
+
+When it serves, it prints one line on standard output:
+  fathomd: ready on ADDR mission FILE revision N
+SIGTERM drains it: streams end when what they sent is on the disk.)";
+
+struct Flags {
+  std::string mission_path;
+  bool create = false;
+  std::string south_west;
+  std::string north_west;
+  std::string center;
+  double side_nmi = 0;
+  double ageing_m2_per_day = 0;
+  NewMission mission;
+  ListenOptions listen;
+  std::string log_level = "info";
+  std::string port_file;
+};
+
+void AddFlags(CLI::App& app, Flags& flags) {
+  app.add_option("--mission", flags.mission_path,
+                 "The mission file. One server at a time may hold it")
+      ->required()
+      ->type_name("FILE");
+  app.add_option("--listen", flags.listen.address,
+                 "HOST:PORT (port 0: any free one) or unix:PATH. Addresses "
+                 "that other machines can reach need mutual TLS")
+      ->capture_default_str()
+      ->type_name("ADDR");
+  app.add_option("--port-file", flags.port_file,
+                 "Write the port to this file once serving (for scripts)")
+      ->type_name("FILE");
+  app.add_option("--log-level", flags.log_level,
+                 "debug, info, warning or error; the log goes to standard "
+                 "error")
+      ->capture_default_str();
+
+  const char* const kNew = "A new mission";
+  CLI::Option* const create =
+      app.add_flag("--create", flags.create,
+                   "Make the mission file; it must not exist yet")
+          ->group(kNew);
+  const auto add = [&](const char* name, auto& value, const char* help) {
+    return app.add_option(name, value, help)->needs(create)->group(kNew);
+  };
+  add("--center", flags.center,
+      "Middle of the mission's square, degrees; with --side-nmi")
+      ->type_name("LAT,LON");
+  add("--side-nmi", flags.side_nmi,
+      "Side of the square, nautical miles (1852 m)");
+  add("--south-west", flags.south_west,
+      "Or: the square's south-west corner, degrees")
+      ->type_name("LAT,LON");
+  add("--north-west", flags.north_west,
+      "and its north-west corner; the square lies east of the line")
+      ->type_name("LAT,LON");
+  add("--min-cell-m", flags.mission.min_cell_m,
+      "Finest cell of the global map, metres")
+      ->capture_default_str();
+  add("--tolerance-m", flags.mission.tolerance_m,
+      "Neighbouring cells whose depths agree within this become one, metres")
+      ->capture_default_str();
+  add("--max-cells", flags.mission.max_cells,
+      "Most cells of the global map (about 12 bytes each)")
+      ->capture_default_str();
+  add("--max-contacts", flags.mission.max_contacts,
+      "Most moving obstacles tracked at once")
+      ->capture_default_str();
+  add("--ageing-m2-per-day", flags.ageing_m2_per_day,
+      "Variance that static evidence gains per day of age, m^2; 0: it never "
+      "ages")
+      ->capture_default_str();
+  add("--name", flags.mission.name, "The mission's name, for people");
+  add("--datum", flags.mission.vertical_datum,
+      "What all depths are measured from, e.g. MLLW, MSL")
+      ->capture_default_str();
+
+  const char* const kTls = "Mutual TLS (PEM files, all three or none)";
+  app.add_option("--tls-cert", flags.listen.tls_cert,
+                 "The server's certificate chain")
+      ->group(kTls)
+      ->type_name("FILE");
+  app.add_option("--tls-key", flags.listen.tls_key, "Its private key")
+      ->group(kTls)
+      ->type_name("FILE");
+  app.add_option("--tls-client-ca", flags.listen.tls_client_ca,
+                 "Authority whose clients are let in")
+      ->group(kTls)
+      ->type_name("FILE");
+}
+
+absl::Status ReadPoint(const char* flag, const std::string& text,
+                       std::optional<map::GeodeticPoint>& point) {
+  if (text.empty()) return absl::OkStatus();
+  auto parsed = ParsePoint(text);
+  if (!parsed.ok()) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "%s: %s", flag, std::string(parsed.status().message())));
+  }
+  point = *parsed;
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::unique_ptr<storage::MissionFile>> OpenFile(
+    Flags& flags, const Clock& clock) {
+  if (!flags.create) return storage::MissionFile::Open(flags.mission_path);
+  NewMission& mission = flags.mission;
+  FATHOM_RETURN_IF_ERROR(ReadPoint("--center", flags.center, mission.center));
+  FATHOM_RETURN_IF_ERROR(
+      ReadPoint("--south-west", flags.south_west, mission.south_west));
+  FATHOM_RETURN_IF_ERROR(
+      ReadPoint("--north-west", flags.north_west, mission.north_west));
+  mission.side_m = flags.side_nmi * kMetresPerNmi;
+  mission.ageing_rate_m2_s = flags.ageing_m2_per_day / 86'400;
+  return CreateMission(flags.mission_path, mission, clock.Now());
+}
+
+// Written beside and renamed, so that a reader never sees half a number.
+absl::Status WritePortFile(const std::string& path, const Server& server) {
+  const std::string part = path + ".part";
+  std::FILE* const file = std::fopen(part.c_str(), "w");
+  if (file == nullptr) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("--port-file=%s cannot be written", path));
+  }
+  std::fprintf(file, "%d\n", server.port());
+  if (std::fclose(file) != 0 || std::rename(part.c_str(), path.c_str()) != 0) {
+    return absl::InternalError(
+        absl::StrFormat("--port-file=%s cannot be written", path));
+  }
+  return absl::OkStatus();
+}
+
+// Blocks the signals that end the program, for this thread and those that it
+// starts: only Serve waits for them.
+sigset_t BlockEndSignals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  return signals;
+}
+
+absl::Status Serve(Flags& flags) {
+  FATHOM_RETURN_IF_ERROR(CheckListenOptions(flags.listen));
+  const sigset_t signals = BlockEndSignals();
+  // A client that goes away is an error of its call, not of the program.
+  signal(SIGPIPE, SIG_IGN);
+
+  const SystemClock clock;
+  FATHOM_ASSIGN_OR_RETURN(const auto file, OpenFile(flags, clock));
+  FATHOM_ASSIGN_OR_RETURN(MapKeeper::Restored restored, RestoreMission(*file));
+  Log(LogLevel::kInfo, "mission opened path=%s revision=%d replayed=%d",
+      flags.mission_path, restored.map->revision(), restored.journal_records);
+
+  std::atomic<bool> failed{false};
+  KeeperOptions options;
+  options.on_fatal = [&failed](const absl::Status& status) {
+    Log(LogLevel::kError, "the mission file failed: %s", status.ToString());
+    failed = true;
+    // Wakes sigwait; the server then stops like on any other SIGTERM.
+    kill(getpid(), SIGTERM);
+  };
+  MissionFileStore store(*file);
+  MapKeeper keeper(std::move(restored), store, std::move(options));
+  ServerContext context{.keeper = keeper, .file = *file, .clock = clock};
+  FATHOM_ASSIGN_OR_RETURN(const auto server,
+                          Server::Start(flags.listen, context));
+  if (!flags.port_file.empty()) {
+    FATHOM_RETURN_IF_ERROR(WritePortFile(flags.port_file, *server));
+  }
+  absl::PrintF("fathomd: ready on %s mission %s revision %d\n",
+               server->address(), flags.mission_path,
+               keeper.View()->revision());
+  std::fflush(stdout);
+
+  int signal_number = 0;
+  sigwait(&signals, &signal_number);
+  Log(LogLevel::kInfo, "stopping signal=%d", signal_number);
+  server->Drain();
+  const absl::Status stopped = keeper.Stop();
+  const absl::Status closed = file->Close();
+  if (failed || !stopped.ok()) {
+    return absl::Status(stopped.code(),
+                        absl::StrFormat("not everything could be written "
+                                        "(nothing acknowledged is lost): %s",
+                                        std::string(stopped.message())));
+  }
+  FATHOM_RETURN_IF_ERROR(closed);
+  Log(LogLevel::kInfo, "stopped path=%s revision=%d", flags.mission_path,
+      keeper.View()->revision());
+  return absl::OkStatus();
+}
+
+int Main(int argc, char** argv) {
+  CLI::App app(kAbout, "fathomd");
+  app.set_version_flag("--version", "fathomd " FATHOM_VERSION);
+  Flags flags;
+  AddFlags(app, flags);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  const auto level = ParseLogLevel(flags.log_level);
+  if (!level.ok()) {
+    absl::FPrintF(stderr, "fathomd: --log-level: %s\n",
+                  std::string(level.status().message()));
+    return 2;
+  }
+  InitLog("fathomd", *level);
+  const absl::Status status = Serve(flags);
+  if (status.ok()) return 0;
+  absl::FPrintF(stderr, "fathomd: %s\n", std::string(status.message()));
+  return absl::IsInvalidArgument(status) ? 2 : 1;
+}
+
+}  // namespace
+}  // namespace fathom::server
+
+int main(int argc, char** argv) { return fathom::server::Main(argc, argv); }
