@@ -85,8 +85,11 @@ Georeference MakeProjected(std::shared_ptr<ProjectedReference> reference) {
 bool IsNorthUpGeographic(const OGRSpatialReference* spatial,
                          const std::array<double, 6>& affine) {
   const bool geographic = spatial == nullptr || spatial->IsGeographic();
+  // A raster without any system (ETOPO5's netCDF) is taken for degrees only
+  // if its corner could be one.
   return geographic && affine[2] == 0.0 && affine[4] == 0.0 &&
-         affine[1] > 0.0 && affine[5] < 0.0;
+         affine[1] > 0.0 && affine[5] < 0.0 && std::abs(affine[0]) <= 360.5 &&
+         std::abs(affine[3]) <= 90.5;
 }
 
 absl::StatusOr<Georeference> MakeGeoreference(
@@ -309,12 +312,22 @@ absl::StatusOr<Terrain> RefineTerrain(const Terrain& coarse,
   const double latitude_step_deg = options.cell_size_m / kMetresPerDegree;
   const double longitude_step_deg =
       latitude_step_deg /
-      std::cos(options.middle.latitude_deg * std::numbers::pi / 180.0);
+      std::cos(options.center.latitude_deg * std::numbers::pi / 180.0);
+  // Whole cells south and east from the centre to the window's first cell.
+  const double first_row =
+      std::round((options.center.latitude_deg - options.middle.latitude_deg) /
+                     latitude_step_deg -
+                 0.5 * side);
+  const double first_column =
+      std::round(map::NormalizeLongitudeDeg(options.middle.longitude_deg -
+                                            options.center.longitude_deg) /
+                     longitude_step_deg -
+                 0.5 * side);
   const map::GeodeticPoint north_west = {
       .latitude_deg =
-          options.middle.latitude_deg + 0.5 * side * latitude_step_deg,
+          options.center.latitude_deg - first_row * latitude_step_deg,
       .longitude_deg = map::NormalizeLongitudeDeg(
-          options.middle.longitude_deg - 0.5 * side * longitude_step_deg)};
+          options.center.longitude_deg + first_column * longitude_step_deg)};
   const Georeference georeference =
       GeographicReference(north_west, latitude_step_deg, longitude_step_deg);
   TerrainGrid grid;
@@ -339,8 +352,9 @@ absl::StatusOr<Terrain> RefineTerrain(const Terrain& coarse,
       }
       double depth_m = *base_m;
       if (depth_m > options.min_water_m) {
-        depth_m += relief.At(-center.row * options.cell_size_m,
-                             center.column * options.cell_size_m);
+        depth_m +=
+            relief.At(-(first_row + center.row) * options.cell_size_m,
+                      (first_column + center.column) * options.cell_size_m);
         depth_m = std::max(depth_m, options.min_water_m);
       }
       grid.depth_m.push_back(static_cast<float>(depth_m));

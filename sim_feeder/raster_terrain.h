@@ -62,8 +62,13 @@ absl::StatusOr<Terrain> LoadRasterTerrain(const std::string& path,
 // A fine geographic grid over a coarse one, with relief added: what ETOPO5
 // becomes near a survey. Water cells keep at least `min_water_m`, so that the
 // relief makes no islands; coarse land stays as it is.
+//
+// Cells and relief hang on `center`, not on the window: two windows about one
+// centre agree, cell for cell, where they overlap.
 struct RefinedTerrainOptions {
-  // Middle of the grid and half its side, metres.
+  // Where cells and relief are counted from.
+  map::GeodeticPoint center;
+  // Middle of the window and half its side, metres.
   map::GeodeticPoint middle;
   double half_side_m = 2'000.0;
   double cell_size_m = 10.0;
@@ -71,8 +76,9 @@ struct RefinedTerrainOptions {
   ReliefOptions relief;
 };
 
-// Errors: INVALID_ARGUMENT for sizes <= 0; RESOURCE_EXHAUSTED above 4 M cells
-// (20 s of relief); OUT_OF_RANGE when `coarse` has no value at the middle.
+// Errors: INVALID_ARGUMENT for sizes <= 0; RESOURCE_EXHAUSTED above 2000 x
+// 2000 cells (20 s of relief); OUT_OF_RANGE when `coarse` has no value at the
+// middle.
 absl::StatusOr<Terrain> RefineTerrain(const Terrain& coarse,
                                       const RefinedTerrainOptions& options);
 

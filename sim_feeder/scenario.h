@@ -31,7 +31,7 @@ struct Scenario {
 
   ForwardSonarOptions sonar;
   // Between pings, seconds, > 0.
-  double ping_interval_s = 0.5;
+  double ping_interval_s = 1.0;
   // How many pings; 0: as many as cover the area once.
   std::uint64_t pings = 0;
 

@@ -33,7 +33,7 @@ struct AreaPickOptions {
   double max_depth_m = 500.0;
   // Search about this place and no farther than this; absent (0): the whole
   // raster about its middle.
-  map::GeodeticPoint near;
+  map::GeodeticPoint near = {};
   double search_radius_m = 0.0;
 };
 

@@ -1,0 +1,235 @@
+#include "sim_feeder/evaluate_command.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include "absl/strings/str_format.h"
+#include "base/clock.h"
+#include "base/status_macros.h"
+#include "client/proto_time.h"
+#include "map/geodesy/ned_frame.h"
+#include "sim_feeder/evaluation_report.h"
+#include "sim_feeder/random.h"
+
+namespace fathom::feeder {
+namespace {
+
+// Points in one question: far below every server's limit.
+constexpr std::size_t kBatch = 4'096;
+constexpr std::uint64_t kMaxPoints = 10'000'000;
+// Looks at the contacts through the run, and past its end.
+constexpr int kContactLooks = 20;
+constexpr double kSettlingS = 60.0;
+// Truth is asked inside the area only.
+constexpr double kEvaluationMarginM = 50.0;
+
+struct Place {
+  map::GeodeticPoint position;
+  double truth_m;
+};
+
+absl::StatusOr<v1::QueryObstaclesResponse> Ask(
+    const client::Client& client, const std::vector<Place>& places,
+    const std::vector<float>& depths_m, Time time) {
+  v1::QueryObstaclesRequest request;
+  for (const Place& place : places) {
+    request.add_latitude_deg(place.position.latitude_deg);
+    request.add_longitude_deg(place.position.longitude_deg);
+  }
+  request.mutable_depth_m()->Add(depths_m.begin(), depths_m.end());
+  *request.mutable_time() = client::ToProto(time);
+  request.set_confidence(0.95);
+  request.set_with_reasons(true);
+  FATHOM_ASSIGN_OR_RETURN(v1::QueryObstaclesResponse response,
+                          client.QueryObstacles(request));
+  const int count = static_cast<int>(places.size());
+  if (response.probability_size() != count ||
+      response.mean_depth_m_size() != count || response.std_m_size() != count ||
+      response.kind_size() != count) {
+    return absl::InternalError(
+        absl::StrFormat("the server answered %d of %d points",
+                        response.probability_size(), count));
+  }
+  return response;
+}
+
+// Counts one batch of depths; returns the depths for the second question.
+std::vector<float> CountDepths(const std::vector<Place>& places,
+                               const v1::QueryObstaclesResponse& response,
+                               Random& random, DepthEvaluation& result) {
+  std::vector<float> depths_m;
+  depths_m.reserve(places.size());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const int k = static_cast<int>(i);
+    const double mean_m = response.mean_depth_m(k);
+    const double std_m = response.std_m(k);
+    const v1::EvidenceKind kind = response.kind(k);
+    // Drawn for every place, so that one answer does not shift the others.
+    const double offset = random.Uniform(-3.0, 3.0);
+    if (kind == v1::EVIDENCE_KIND_LAND) {
+      ++(places[i].truth_m <= 0.0 ? result.land_right : result.land_wrong);
+    } else if (kind == v1::EVIDENCE_KIND_UNSPECIFIED || !(std_m > 0.0)) {
+      ++result.unknown;
+    } else {
+      result.by_kind[kind].Add(mean_m, std_m, places[i].truth_m);
+      depths_m.push_back(static_cast<float>(
+          std::clamp(mean_m + offset * std_m, -100.0, 12'000.0)));
+      continue;
+    }
+    depths_m.push_back(0.0f);
+  }
+  return depths_m;
+}
+
+void CountObstacles(const std::vector<Place>& places,
+                    const std::vector<float>& depths_m,
+                    const v1::QueryObstaclesResponse& response,
+                    DepthEvaluation& result) {
+  std::vector<bool> touched(places.size());
+  for (const v1::PointContact& contact : response.contacts()) {
+    if (contact.point_index() < places.size()) {
+      touched[contact.point_index()] = true;
+    }
+  }
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const int k = static_cast<int>(i);
+    const v1::EvidenceKind kind = response.kind(k);
+    if (kind == v1::EVIDENCE_KIND_UNSPECIFIED ||
+        kind == v1::EVIDENCE_KIND_LAND || !(response.std_m(k) > 0.0f)) {
+      continue;
+    }
+    if (touched[i]) {
+      ++result.near_contact;
+      continue;
+    }
+    result.reliability.Add(
+        std::clamp<double>(response.probability(k), 0.0, 1.0),
+        places[i].truth_m <= depths_m[i]);
+  }
+}
+
+absl::Status AddContacts(const client::Client& client,
+                         const SurveyRecord& survey, double seconds,
+                         ContactScore& score, std::uint64_t& missing) {
+  v1::ListContactsRequest request;
+  *request.mutable_time() = client::ToProto(
+      survey.start_time + std::chrono::duration_cast<Duration>(
+                              std::chrono::duration<double>(seconds)));
+  request.set_include_inactive(true);
+  FATHOM_ASSIGN_OR_RETURN(const v1::ListContactsResponse response,
+                          client.ListContacts(request));
+  const map::NedFrame area_frame(survey.area.south_west);
+  for (const Ship& ship : survey.ships) {
+    const auto found =
+        std::find_if(response.contacts().begin(), response.contacts().end(),
+                     [&](const v1::ContactEstimate& contact) {
+                       return contact.contact_id() == ship.id &&
+                              contact.source_id() == survey.source_id;
+                     });
+    if (found == response.contacts().end() || found->covariance_size() != 10) {
+      ++missing;
+      continue;
+    }
+    const PlanePoint truth = ship.PlaceAt(seconds);
+    const map::NedFrame here(
+        {.latitude_deg = found->position().latitude_deg(),
+         .longitude_deg = found->position().longitude_deg()});
+    const map::NedPoint away =
+        here.ToNed(area_frame.ToGeodetic(truth.north_m, truth.east_m));
+    // Row-major upper triangle: nn ne n.vn n.ve ee ...
+    score.Add(-away.north_m, -away.east_m,
+              {.nn = found->covariance(0),
+               .ne = found->covariance(1),
+               .ee = found->covariance(4)});
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<DepthEvaluation> EvaluateDepth(const client::Client& client,
+                                              const LocalTerrain& seabed,
+                                              const SurveyArea& area, Time time,
+                                              std::uint64_t seed,
+                                              std::uint64_t points) {
+  Random random(seed, RandomStream::kEvaluation);
+  DepthEvaluation result;
+  while (result.points < points) {
+    std::vector<Place> places;
+    while (places.size() < kBatch && result.points < points) {
+      ++result.points;
+      const double north_m = random.Uniform(0.0, area.north_extent_m);
+      const double east_m = random.Uniform(0.0, area.east_extent_m);
+      const std::optional<double> truth_m = seabed.DepthAt(north_m, east_m);
+      if (!truth_m.has_value()) {
+        ++result.without_truth;
+        continue;
+      }
+      places.push_back({.position = seabed.frame().ToGeodetic(north_m, east_m),
+                        .truth_m = *truth_m});
+    }
+    if (places.empty()) break;
+    FATHOM_ASSIGN_OR_RETURN(
+        const v1::QueryObstaclesResponse depths,
+        Ask(client, places, std::vector<float>(places.size(), 0.0f), time));
+    const std::vector<float> asked_m =
+        CountDepths(places, depths, random, result);
+    FATHOM_ASSIGN_OR_RETURN(const v1::QueryObstaclesResponse obstacles,
+                            Ask(client, places, asked_m, time));
+    CountObstacles(places, asked_m, obstacles, result);
+  }
+  return result;
+}
+
+absl::StatusOr<ContactEvaluation> EvaluateContacts(const client::Client& client,
+                                                   const SurveyRecord& survey) {
+  ContactEvaluation result;
+  if (survey.ships.empty()) return result;
+  const double duration_s = ToSeconds(survey.end_time - survey.start_time);
+  for (int i = 0; i < kContactLooks; ++i) {
+    const double seconds =
+        kSettlingS + (duration_s - kSettlingS) * i / (kContactLooks - 1);
+    if (seconds < kSettlingS) continue;
+    FATHOM_RETURN_IF_ERROR(
+        AddContacts(client, survey, seconds, result.during, result.missing));
+  }
+  for (const int horizon_s : {0, 60, 300, 600}) {
+    FATHOM_RETURN_IF_ERROR(AddContacts(client, survey, duration_s + horizon_s,
+                                       result.predicted[horizon_s],
+                                       result.missing));
+  }
+  return result;
+}
+
+absl::Status Evaluate(const EvaluateOptions& options) {
+  if (options.points < 1 || options.points > kMaxPoints) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "points=%d must be 1 to %d", options.points, kMaxPoints));
+  }
+  SurveyRecord survey;
+  survey.area = options.area;
+  survey.end_time = SystemClock().Now();
+  if (!options.survey_path.empty()) {
+    FATHOM_ASSIGN_OR_RETURN(survey, LoadSurveyRecord(options.survey_path));
+  }
+  FATHOM_ASSIGN_OR_RETURN(const TruthSource truth,
+                          TruthSource::Load(options.truth));
+  FATHOM_ASSIGN_OR_RETURN(const std::shared_ptr<const LocalTerrain> seabed,
+                          truth.SeabedAbout(survey.area, kEvaluationMarginM));
+  FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<client::Client> client,
+                          client::Client::Connect(options.server, {}));
+  FATHOM_ASSIGN_OR_RETURN(const DepthEvaluation depth,
+                          EvaluateDepth(*client, *seabed, survey.area,
+                                        options.time.value_or(survey.end_time),
+                                        options.seed, options.points));
+  FATHOM_ASSIGN_OR_RETURN(const ContactEvaluation contacts,
+                          EvaluateContacts(*client, survey));
+  const std::string report = options.json ? EvaluationJson(depth, contacts)
+                                          : EvaluationTable(depth, contacts);
+  absl::PrintF("%s\n", report);
+  return absl::OkStatus();
+}
+
+}  // namespace fathom::feeder

@@ -1,0 +1,68 @@
+// `fathom-feeder run`: one simulated survey, into a server or a file.
+
+#ifndef FATHOM_SIM_FEEDER_RUN_COMMAND_H_
+#define FATHOM_SIM_FEEDER_RUN_COMMAND_H_
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "fathom/v1/mission_service.pb.h"
+#include "sim_feeder/message_sink.h"
+#include "sim_feeder/scenario.h"
+#include "sim_feeder/simulation.h"
+#include "sim_feeder/survey_record.h"
+#include "sim_feeder/truth_source.h"
+
+namespace fathom::feeder {
+
+struct RunOptions {
+  // Empty: no server (dry run; then a record file makes sense).
+  std::string server;
+  std::string source_id = "feeder";
+  // 0: the wall clock, which is larger than every epoch before.
+  std::uint64_t epoch = 0;
+
+  TruthOptions truth;
+  // The area; or the side of a square to be found in the truth.
+  std::optional<double> auto_area_side_m;
+  Scenario scenario;
+  // Absent: so that the run ends now (flat out) or begins now (paced).
+  std::optional<Time> start_time;
+  // Length of the run; wins over scenario.pings.
+  std::optional<double> duration_s;
+  // Times real time; 0: flat out.
+  double rate = 0.0;
+
+  // Open the activity first. Its area, cell size and id are the scenario's.
+  bool start_activity = true;
+  v1::ActivityParameters activity;
+  std::string vehicle_id;
+  // Complete it at the end (transfer to the global map).
+  bool complete_activity = false;
+
+  std::string pings_out;
+  std::string reports_out;
+  std::string track_out;
+  bool show_progress = false;
+  bool json = false;
+};
+
+// Runs and prints: for people on standard error, with `json` the survey record
+// as one line on standard output.
+//
+// Errors: of the truth, the scenario, the connection and the streams.
+absl::Status RunSurvey(const RunOptions& options);
+
+// The part without network or files: drives `simulation` into `sink` and adds
+// what was sent and acknowledged to `record`. `track` (may be null) gets CSV
+// lines of the vehicle's way, one per ping.
+absl::Status DriveSurvey(Simulation& simulation, MessageSink& sink, double rate,
+                         bool show_progress, std::ostream* track,
+                         SurveyRecord& record);
+
+}  // namespace fathom::feeder
+
+#endif  // FATHOM_SIM_FEEDER_RUN_COMMAND_H_

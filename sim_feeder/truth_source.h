@@ -1,0 +1,59 @@
+// Where the truth comes from, as the command line states it: a raster, or
+// ETOPO5 with seeded relief about a stated centre.
+//
+// `run` and `evaluate` build the same seabed from the same statement; the
+// seed of the relief is its own, so that runs with different seeds survey one
+// seabed. Not thread-safe (PROJ).
+
+#ifndef FATHOM_SIM_FEEDER_TRUTH_SOURCE_H_
+#define FATHOM_SIM_FEEDER_TRUTH_SOURCE_H_
+
+#include <memory>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "sim_feeder/local_terrain.h"
+#include "sim_feeder/raster_terrain.h"
+#include "sim_feeder/survey_area.h"
+
+namespace fathom::feeder {
+
+struct TruthOptions {
+  // A raster; empty: ETOPO5 with relief.
+  std::string path;
+  Positive positive = Positive::kAuto;
+  // ETOPO5's file, and where relief and search for an area have their centre.
+  std::string etopo_path = std::string(kEtopo5Path);
+  map::GeodeticPoint center = {.latitude_deg = 41.2, .longitude_deg = -71.4};
+  double fine_cell_m = 10.0;
+  ReliefOptions relief;
+};
+
+class TruthSource {
+ public:
+  // Errors: as LoadRasterTerrain.
+  static absl::StatusOr<TruthSource> Load(const TruthOptions& options);
+
+  // The best square for a survey (survey_area.h); with ETOPO5 within 20 km of
+  // the centre.
+  absl::StatusOr<PickedArea> Pick(double side_m, double cell_size_m,
+                                  double min_depth_m) const;
+
+  // The seabed about an area, with the margin that a sonar of that reach
+  // needs. Errors: as RefineTerrain and LocalTerrain::Create.
+  absl::StatusOr<std::shared_ptr<const LocalTerrain>> SeabedAbout(
+      const SurveyArea& area, double max_slant_range_m) const;
+
+  // What it is, for people.
+  std::string Describe() const;
+
+ private:
+  TruthSource(const TruthOptions& options, Terrain terrain);
+
+  TruthOptions options_;
+  std::shared_ptr<const Terrain> terrain_;
+};
+
+}  // namespace fathom::feeder
+
+#endif  // FATHOM_SIM_FEEDER_TRUTH_SOURCE_H_
