@@ -241,9 +241,9 @@ absl::StatusOr<Terrain> LoadRasterTerrain(const std::string& path,
       !std::filesystem::exists(path, ignored)) {
     return absl::NotFoundError(absl::StrFormat("no such file: %s", path));
   }
-  const DatasetPtr dataset(GDALDataset::FromHandle(
-      GDALOpenEx(path.c_str(), GDAL_OF_RASTER | GDAL_OF_READONLY, nullptr,
-                 nullptr, nullptr)));
+  const DatasetPtr dataset(GDALDataset::FromHandle(GDALOpenEx(
+      path.c_str(), GDAL_OF_RASTER | GDAL_OF_READONLY | GDAL_OF_VERBOSE_ERROR,
+      nullptr, nullptr, nullptr)));
   if (dataset == nullptr || dataset->GetRasterCount() < 1) {
     return absl::InvalidArgumentError(
         absl::StrFormat("GDAL cannot read %s: %s", path, CPLGetLastErrorMsg()));

@@ -28,13 +28,29 @@ WaterGrid::WaterGrid(const LocalTerrain& terrain, const SurveyArea& area,
                      std::min(terrain.cell_size_m(), shorter_m / 16.0));
   rows_ = CellsAlong(area.north_extent_m, cell_m_);
   columns_ = CellsAlong(area.east_extent_m, cell_m_);
-  open_.resize(rows_ * columns_);
+  open_.resize(rows_ * columns_, 1);
+  // Half a terrain cell apart, borders included: a hole in the terrain (two
+  // of its cells wide, since the seabed is bilinear) cannot hide between.
+  const int looks =
+      2 * static_cast<int>(std::ceil(cell_m_ / terrain.cell_size_m())) + 1;
+  std::vector<std::size_t> holes;
   for (std::size_t i = 0; i < open_.size(); ++i) {
     const PlanePoint center = CenterOf(i);
-    const std::optional<double> depth_m =
-        terrain.DepthAt(center.north_m, center.east_m);
-    open_[i] = depth_m.has_value() && *depth_m >= min_water_m ? 1 : 0;
+    bool hole = false;
+    for (int k = 0; k < looks * looks && !hole; ++k) {
+      const double north_m =
+          center.north_m +
+          (static_cast<double>(k / looks) / (looks - 1) - 0.5) * cell_m_;
+      const double east_m =
+          center.east_m +
+          (static_cast<double>(k % looks) / (looks - 1) - 0.5) * cell_m_;
+      const std::optional<double> depth_m = terrain.DepthAt(north_m, east_m);
+      if (!depth_m.has_value()) hole = true;
+      if (!depth_m.has_value() || *depth_m < min_water_m) open_[i] = 0;
+    }
+    if (hole) holes.push_back(i);
   }
+  for (const std::size_t hole : holes) CloseAround(hole);
   KeepLargestWater();
 }
 
@@ -52,6 +68,18 @@ std::size_t WaterGrid::IndexOf(const PlanePoint& place) const {
 PlanePoint WaterGrid::CenterOf(std::size_t index) const {
   return {.north_m = (static_cast<double>(index / columns_) + 0.5) * cell_m_,
           .east_m = (static_cast<double>(index % columns_) + 0.5) * cell_m_};
+}
+
+void WaterGrid::CloseAround(std::size_t index) {
+  const std::size_t row = index / columns_;
+  const std::size_t column = index % columns_;
+  for (std::size_t i = row == 0 ? 0 : row - 1;
+       i <= std::min(row + 1, rows_ - 1); ++i) {
+    for (std::size_t j = column == 0 ? 0 : column - 1;
+         j <= std::min(column + 1, columns_ - 1); ++j) {
+      open_[i * columns_ + j] = 0;
+    }
+  }
 }
 
 void WaterGrid::KeepLargestWater() {

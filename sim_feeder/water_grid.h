@@ -17,8 +17,10 @@ namespace fathom::feeder {
 // Immutable after construction; thread-safe.
 class WaterGrid {
  public:
-  // Looks the terrain up at the centre of each cell. The cells are as large as
-  // the terrain's, but at most kMaxCellsPerSide fit along the longer side.
+  // The cells are as large as the terrain's, but at most kMaxCellsPerSide fit
+  // along the longer side. A cell is open where every look at the terrain, half
+  // a terrain cell apart, finds min_water_m; around a hole in the terrain the
+  // neighbours are closed too.
   WaterGrid(const LocalTerrain& terrain, const SurveyArea& area,
             double min_water_m);
 
@@ -42,6 +44,8 @@ class WaterGrid {
  private:
   std::size_t IndexOf(const PlanePoint& place) const;
   PlanePoint CenterOf(std::size_t index) const;
+  // Closes a cell and its eight neighbours.
+  void CloseAround(std::size_t index);
   void KeepLargestWater();
   std::vector<std::size_t> SearchCells(std::size_t from, std::size_t to) const;
 
