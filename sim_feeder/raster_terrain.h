@@ -38,10 +38,10 @@ absl::StatusOr<Positive> ParsePositive(std::string_view name);
 
 // What of a band tells which way its values grow.
 struct BandDescription {
-  std::string driver;       // GDAL's short name, "BAG".
-  std::string description;  // Description and long_name.
-  std::string positive;     // CF attribute "positive": "up" or "down".
-  double mean = 0.0;        // Of the valid values.
+  std::string driver = {};       // GDAL's short name, "BAG".
+  std::string description = {};  // Description and long_name.
+  std::string positive = {};     // CF attribute "positive": "up" or "down".
+  double mean = 0.0;             // Of the valid values.
 };
 
 // In this order: the CF attribute; the BAG driver (elevation by its standard);

@@ -25,7 +25,7 @@ struct Scenario {
   // Between legs, metres; absent: 2 tan(60 deg) times the altitude over the
   // area's median water, so that neighbouring swaths (which reach to 75 deg)
   // overlap.
-  std::optional<double> track_spacing_m;
+  std::optional<double> track_spacing_m = {};
   // Least water that the vehicle goes over, metres.
   double min_water_m = 4.0;
 

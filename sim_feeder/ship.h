@@ -18,10 +18,10 @@ namespace fathom::feeder {
 
 struct Ship {
   // Contact id, "ship-1" and so on.
-  std::string id;
+  std::string id = {};
   v1::ContactClass contact_class = v1::CONTACT_CLASS_VESSEL;
   // At the start of the simulation, in the plane about the area's south-west.
-  PlanePoint start;
+  PlanePoint start = {};
   double north_m_s = 0.0;
   double east_m_s = 0.0;
 

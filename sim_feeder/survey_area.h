@@ -13,7 +13,7 @@ namespace fathom::feeder {
 // As fathom.v1.ActivityParameters has it: extents along the axes of the plane
 // that touches the Earth at the south-west corner.
 struct SurveyArea {
-  map::GeodeticPoint south_west;
+  map::GeodeticPoint south_west = {};
   double north_extent_m = 0.0;
   double east_extent_m = 0.0;
   // Side of a cell of the activity's local map.

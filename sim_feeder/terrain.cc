@@ -1,5 +1,6 @@
 #include "sim_feeder/terrain.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -7,6 +8,11 @@
 #include "absl/strings/str_format.h"
 
 namespace fathom::feeder {
+namespace {
+
+constexpr double kRounding = 1e-6;
+
+}  // namespace
 
 absl::StatusOr<Terrain> Terrain::Create(TerrainGrid grid,
                                         Georeference georeference) {
@@ -39,16 +45,18 @@ std::optional<double> Terrain::DepthAt(const map::GeodeticPoint& point) const {
 
 std::optional<double> Terrain::DepthAtGrid(const GridPoint& place) const {
   double x = place.column - 0.5;
-  const double y = place.row - 0.5;
+  double y = place.row - 0.5;
   const double last_row = static_cast<double>(grid_.rows - 1);
-  const double last_column = static_cast<double>(grid_.columns - 1);
-  // Written so that NaN fails.
-  if (!(y >= 0.0 && y <= last_row)) return std::nullopt;
+  const double last_column =
+      static_cast<double>(grid_.columns - (grid_.wraps_east ? 0 : 1));
   if (grid_.wraps_east && x < 0.0) x += static_cast<double>(grid_.columns);
-  if (!(x >= 0.0 &&
-        x <= (grid_.wraps_east ? last_column + 1.0 : last_column))) {
+  // A millionth of a cell is rounding. Written so that NaN fails.
+  if (!(y >= -kRounding && y <= last_row + kRounding && x >= -kRounding &&
+        x <= last_column + kRounding)) {
     return std::nullopt;
   }
+  x = std::clamp(x, 0.0, last_column);
+  y = std::clamp(y, 0.0, last_row);
   std::size_t row = static_cast<std::size_t>(y);
   std::size_t column = static_cast<std::size_t>(x);
   if (row == grid_.rows - 1) --row;  // y is exactly the last centre.

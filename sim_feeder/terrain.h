@@ -41,13 +41,13 @@ struct TerrainGrid {
   std::size_t rows = 0;
   std::size_t columns = 0;
   // Row-major, metres, positive down, NaN: no value.
-  std::vector<float> depth_m;
+  std::vector<float> depth_m = {};
   // Side of a cell, metres, about: what a ray steps by.
   double cell_size_m = 0.0;
   // The last column is followed by the first (a grid around the whole Earth).
   bool wraps_east = false;
   // What it is, for people.
-  std::string name;
+  std::string name = {};
 };
 
 class Terrain {

@@ -22,11 +22,12 @@ struct VehicleOptions {
   double speed_m_s = 2.0;
   // Turning on the spot, degrees per second, > 0.
   double turn_rate_deg_s = 15.0;
-  // Height above the seabed to keep, metres, > 0; the vehicle never goes
-  // deeper than that.
+  // Height above the seabed to keep, metres, > 0; the vehicle never goes lower
+  // (at an edge by 1 m times the slope of its climb: depths are planned every
+  // 2 m).
   double altitude_m = 15.0;
   // If given: the depth to keep, metres, where the altitude allows it.
-  std::optional<double> depth_m;
+  std::optional<double> depth_m = {};
   // Never shallower than this, metres, >= 0. In water shallower than altitude
   // plus this the vehicle runs at half the water depth at most.
   double least_depth_m = 1.0;
