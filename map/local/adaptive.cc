@@ -24,53 +24,70 @@ double Excess(const Evidence& evidence) {
   return (evidence.scatter - (n - 1.0)) * n / evidence.weight;
 }
 
+// Squared steps between neighbours along one axis, their noise taken off.
+struct Steps {
+  float square_sum = 0.0f;
+  float count = 0.0f;
+};
+
 }  // namespace
 
 RegionalVariability VariabilityAround(const Neighbourhood& cells,
                                       double cell_size_m) {
-  double step2_sum[2] = {0.0, 0.0};  // North, east.
-  double steps[2] = {0.0, 0.0};
-  double excess = 0.0;
-  double scatter_freedom = 0.0;
+  // Absent cells take part with weight 0 in what follows, so that the loop
+  // over the twelve pairs is free of branches.
+  float mean_m[9];
+  float noise_m2[9];  // Variance of the mean from stated noise alone.
+  float present[9];
+  float excess = 0.0f;
+  float scatter_freedom = 0.0f;
   for (std::size_t k = 0; k < 9; ++k) {
     const Evidence* cell = cells[k];
-    if (cell == nullptr) continue;
-    if (k != kCenter && cell->count > 1) {
-      // The mean over neighbours, each with its own freedom, of tau^2.
-      excess += Excess(*cell);
-      scatter_freedom += cell->count - 1.0;
+    if (cell == nullptr) {
+      mean_m[k] = noise_m2[k] = present[k] = 0.0f;
+      continue;
     }
-    const Evidence* const next[2] = {k < 6 ? cells[k + 3] : nullptr,
-                                     k % 3 < 2 ? cells[k + 1] : nullptr};
-    for (int axis = 0; axis < 2; ++axis) {
-      if (next[axis] == nullptr) continue;
-      const double step_m = static_cast<double>(next[axis]->mean_m) -
-                            static_cast<double>(cell->mean_m);
-      // Two means differ by their noise alone already.
-      const double noise_m2 = 1.0 / cell->weight + 1.0 / next[axis]->weight;
-      step2_sum[axis] += step_m * step_m - noise_m2;
-      steps[axis] += 1.0;
-    }
+    mean_m[k] = cell->mean_m;
+    noise_m2[k] = 1.0f / cell->weight;
+    present[k] = 1.0f;
+    if (k == kCenter) continue;
+    const float n = cell->count;
+    // Summed over the neighbours, each with its freedom: (n - 1) tau^2.
+    excess += (cell->scatter - (n - 1.0f)) * n * noise_m2[k];
+    scatter_freedom += n - 1.0f;
+  }
+  const auto add = [&](std::size_t a, std::size_t b, Steps& steps) {
+    const float both = present[a] * present[b];
+    const float step_m = mean_m[b] - mean_m[a];
+    steps.square_sum += both * (step_m * step_m - noise_m2[a] - noise_m2[b]);
+    steps.count += both;
+  };
+  Steps north;
+  Steps east;
+  for (std::size_t k = 0; k < 6; ++k) add(k, k + 3, north);
+  for (std::size_t k = 0; k < 9; k += 3) {
+    add(k, k + 1, east);
+    add(k + 1, k + 2, east);
   }
 
   const double typical_m = kTypicalSlope * cell_size_m;
   double weighted = kTypicalFreedom * typical_m * typical_m / 12.0;
   double freedom = kTypicalFreedom;
-  if (steps[0] + steps[1] > 0.0) {
+  const float count = north.count + east.count;
+  if (count > 0.0f) {
     // An axis without a pair is taken to step as the other one does.
-    double step2[2];
-    for (int axis = 0; axis < 2; ++axis) {
-      const int used = steps[axis] > 0.0 ? axis : 1 - axis;
-      step2[axis] = std::max(0.0, step2_sum[used] / steps[used]);
-    }
-    const double step_freedom =
-        std::min(kMaxStepFreedom, 0.5 * (steps[0] + steps[1]));
-    weighted += step_freedom * (step2[0] + step2[1]) / 12.0;
+    const Steps& for_north = north.count > 0.0f ? north : east;
+    const Steps& for_east = east.count > 0.0f ? east : north;
+    const double step2_m2 =
+        std::max(0.0f, for_north.square_sum / for_north.count) +
+        std::max(0.0f, for_east.square_sum / for_east.count);
+    const double step_freedom = std::min(kMaxStepFreedom, 0.5 * count);
+    weighted += step_freedom * step2_m2 / 12.0;
     freedom += step_freedom;
   }
-  if (scatter_freedom > 0.0) {
-    const double used = std::min(kMaxScatterFreedom, scatter_freedom);
-    weighted += used * std::max(0.0, excess / scatter_freedom);
+  if (scatter_freedom > 0.0f) {
+    const double used = std::min(kMaxScatterFreedom, double{scatter_freedom});
+    weighted += used * std::max(0.0f, excess / scatter_freedom);
     freedom += used;
   }
   return {.variance_m2 = weighted / freedom, .degrees_of_freedom = freedom};

@@ -8,8 +8,9 @@ std::uint64_t BlockDirectory::memory_bytes() const {
          array_bytes_;
 }
 
-LocalBlock& BlockDirectory::Mutable(BlockIndex index,
-                                    std::uint64_t writer_epoch, bool& created) {
+LocalBlock& BlockDirectory::MakeMutable(BlockIndex index,
+                                        std::uint64_t writer_epoch,
+                                        bool& created) {
   std::shared_ptr<SuperBlock>& super = supers_[SuperOf(index)];
   if (super == nullptr) {
     super = std::make_shared<SuperBlock>();

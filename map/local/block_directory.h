@@ -60,7 +60,18 @@ class BlockDirectory {
   // if a view may see it; `created` tells that it did not exist before and is
   // empty. REQUIRES: the index lies in the map.
   LocalBlock& Mutable(BlockIndex index, std::uint64_t writer_epoch,
-                      bool& created);
+                      bool& created) {
+    // The writer's own block already: nearly every sounding.
+    SuperBlock* super = supers_[SuperOf(index)].get();
+    if (super != nullptr && super->epoch == writer_epoch) {
+      BlockNode* node = super->blocks[SlotOf(index)].get();
+      if (node != nullptr && node->epoch == writer_epoch) {
+        created = false;
+        return node->block;
+      }
+    }
+    return MakeMutable(index, writer_epoch, created);
+  }
 
   // Writer only: a cell of a block was measured for the first time; arrays
   // were added to (or taken from) a block.
@@ -79,6 +90,8 @@ class BlockDirectory {
   void ForEachNotIn(const BlockDirectory* old_directory, Visit visit) const;
 
  private:
+  LocalBlock& MakeMutable(BlockIndex index, std::uint64_t writer_epoch,
+                          bool& created);
   std::size_t SuperOf(BlockIndex index) const {
     return std::size_t{index.row / SuperBlock::kSide} * super_cols_ +
            index.col / SuperBlock::kSide;

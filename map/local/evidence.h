@@ -19,6 +19,7 @@
 #ifndef FATHOM_MAP_LOCAL_EVIDENCE_H_
 #define FATHOM_MAP_LOCAL_EVIDENCE_H_
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 
@@ -27,6 +28,9 @@ namespace fathom::map {
 // The least standard deviation a sounding is taken for: 1 mm, an order below
 // the best echo sounder and the least the global map can store.
 inline constexpr float kMinStdM = 1e-3f;
+
+// The most soundings a cell counts: see Evidence::count.
+inline constexpr std::uint32_t kMaxCount = 65'535;
 
 // Evidence::flags, the thesis's flags of fig. 4-4. Stored: never reuse a bit.
 // kDirectlyUpdated: a sounding fell in the cell (it stays over a transfer).
@@ -59,7 +63,42 @@ static_assert(sizeof(Evidence) == 24);
 // Whether a single sounding may by itself set the shoalest depth of a cell:
 // its 95 % uncertainty is within what IHO S-44 (edition 6) allows order 2
 // surveys, sqrt(1.0^2 + (0.023 d)^2) m.
-bool IsCredible(float depth_m, float std_m);
+inline bool IsCredible(float depth_m, float std_m) {
+  constexpr float kOrder2FixedM = 1.0f;
+  constexpr float kOrder2PerDepth = 0.023f;
+  const float by_depth_m = kOrder2PerDepth * depth_m;
+  const float uncertainty_95_m = 1.96f * std_m;
+  return uncertainty_95_m * uncertainty_95_m <=
+         kOrder2FixedM * kOrder2FixedM + by_depth_m * by_depth_m;
+}
+
+// Inline, because each sounding comes this way.
+inline void Evidence::Add(float depth_m, float std_m,
+                          std::uint32_t sounding_time_s) {
+  const float s_m = std::max(std_m, kMinStdM);
+  const float w = 1.0f / (s_m * s_m);
+  if (count == kMaxCount) {
+    weight *= 0.5f;
+    scatter *= 0.5f;
+    count = kMaxCount / 2;
+  }
+  const float from_old_m = depth_m - mean_m;
+  if (count == 0) {
+    mean_m = depth_m;
+    weight = w;
+    scatter = 0.0f;
+  } else {
+    weight += w;
+    mean_m += from_old_m * (w / weight);
+    scatter += w * from_old_m * (depth_m - mean_m);
+  }
+  ++count;
+  time_s = std::max(time_s, sounding_time_s);
+  // Written so that a NaN, "none yet", gives way.
+  if (!(shoalest_m <= depth_m) && IsCredible(depth_m, s_m)) {
+    shoalest_m = depth_m;
+  }
+}
 
 }  // namespace fathom::map
 

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 
 #include "map/geodesy/ned_frame.h"
 #include "map/local/local_block.h"
@@ -44,16 +43,16 @@ struct LocalGrid {
            static_cast<std::uint32_t>(cell.j) < cells_east;
   }
 
-  // The cell under a point of the plane; nullopt outside and for NaN. The
-  // bound below keeps CellOf's conversion to integers defined.
-  std::optional<CellIndex> Locate(double north_m, double east_m) const {
+  // The cell under a point of the plane into `cell`; false outside and for
+  // NaN. (Not an optional: on the path of each sounding its packing stalls.)
+  // The bound keeps CellOf's conversion to integers defined.
+  bool Locate(double north_m, double east_m, CellIndex& cell) const {
     constexpr double kBoundM = 1e7;  // Beyond any grid; at 1 cm 1e9 cells.
     if (!(std::fabs(north_m) < kBoundM && std::fabs(east_m) < kBoundM)) {
-      return std::nullopt;
+      return false;
     }
-    const CellIndex cell = CellOf(north_m, east_m, options.cell_size_m);
-    if (!Contains(cell)) return std::nullopt;
-    return cell;
+    cell = CellOf(north_m, east_m, options.cell_size_m);
+    return Contains(cell);
   }
 
   static BlockIndex BlockOf(CellIndex cell) {

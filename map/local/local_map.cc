@@ -268,13 +268,12 @@ LocalMap::UpdateResult LocalMap::Update(const Ping& ping,
     const NedPoint obstacle = ObstaclePosition(
         vehicle, BeamOffset(beam.range_m,
                             BeamAzimuthRad(heading_rad, beam.bearing_rad)));
-    const std::optional<CellIndex> cell =
-        grid.Locate(obstacle.north_m, obstacle.east_m);
-    if (!cell.has_value()) {
+    CellIndex cell;
+    if (!grid.Locate(obstacle.north_m, obstacle.east_m, cell)) {
       result.rejects.Add(RejectReason::kOutsideArea);
       continue;
     }
-    state_->AddSounding(*cell, beam, time_s, prior);
+    state_->AddSounding(cell, beam, time_s, prior);
     ++result.accepted;
   }
   return result;

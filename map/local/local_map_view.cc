@@ -24,10 +24,19 @@ Place PlaceOf(const BlockDirectory& directory, CellIndex cell) {
           .k = LocalGrid::OffsetOf(cell)};
 }
 
-// Points at the evidence of a cell and its neighbours. `merged` holds those
-// of which a part was transferred.
+// Room for the evidence of cells of which a part was transferred; left
+// uninitialised because it is rarely needed.
+struct Merged {
+  Merged() {}  // NOLINT(modernize-use-equals-default): must not write.
+  union {
+    std::array<Evidence, 9> cells;
+  };
+};
+
+// Points at the evidence of a cell and its neighbours, in the map or in
+// `merged`.
 Neighbourhood Around(const LocalGrid& grid, const BlockDirectory& directory,
-                     CellIndex cell, std::array<Evidence, 9>& merged) {
+                     CellIndex cell, Merged& merged) {
   Neighbourhood cells = {};
   const std::uint32_t row = static_cast<std::uint32_t>(cell.i) % kBlockSide;
   const std::uint32_t col = static_cast<std::uint32_t>(cell.j) % kBlockSide;
@@ -49,8 +58,8 @@ Neighbourhood Around(const LocalGrid& grid, const BlockDirectory& directory,
     if (place.block->transferred.empty()) {
       cells[n] = &place.block->evidence[place.k];
     } else {
-      merged[n] = place.block->AllEvidence(place.k);
-      cells[n] = &merged[n];
+      cells[n] = std::construct_at(&merged.cells[n],
+                                   place.block->AllEvidence(place.k));
     }
   }
   return cells;
@@ -103,7 +112,7 @@ std::optional<DepthEstimate> ReadMeasured(const LocalGrid& grid,
       read = ReadKalman(evidence, place.block->prior(place.k));
       break;
     case EstimatorKind::kAdaptive: {
-      std::array<Evidence, 9> merged;
+      Merged merged;
       const Neighbourhood cells = Around(grid, directory, cell, merged);
       evidence = *cells[kCenter];
       read = ReadAdaptive(cells, place.block->prior(place.k), cell_size_m);
@@ -153,7 +162,9 @@ std::optional<CellIndex> LocalMapView::CellAt(
     const GeodeticPoint& point) const {
   if (grid_ == nullptr) return std::nullopt;
   const NedPoint at = grid_->frame.ToNed(point);
-  return grid_->Locate(at.north_m, at.east_m);
+  CellIndex cell;
+  if (!grid_->Locate(at.north_m, at.east_m, cell)) return std::nullopt;
+  return cell;
 }
 
 GeodeticPoint LocalMapView::CellCenter(CellIndex cell) const {
@@ -199,7 +210,7 @@ std::optional<DepthEstimate> LocalMapView::EvidenceAt(
     case EstimatorKind::kAdaptive: {
       // The neighbours tell of the terrain, not of this cell's depth, so all
       // they know may be used; of the cell itself only what is new.
-      std::array<Evidence, 9> merged;
+      Merged merged;
       Neighbourhood cells = Around(*grid_, *directory_, *cell, merged);
       cells[kCenter] = &evidence;
       read = ReadAdaptive(cells, CellPrior{}, cell_size_m);

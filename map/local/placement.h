@@ -50,12 +50,19 @@ inline NedPoint ObstaclePosition(const NedPoint& vehicle,
           .down_m = vehicle.down_m + offset.down_m};
 }
 
+// Floor of a number below 2^31, without the library call that std::floor is
+// on plain x86-64: truncated, and one less where that rounded up.
+inline std::int32_t FloorToInt(double x) {
+  const std::int32_t truncated = static_cast<std::int32_t>(x);
+  return truncated - static_cast<std::int32_t>(x < truncated);
+}
+
 // Eq. 4.5, first two lines: i = floor(x / res), j = floor(y / res). A cell
 // owns its south and west border. REQUIRES: cell_size_m > 0 and |x|, |y| below
 // 2^31 cells (callers check: see LocalGrid::Locate).
 inline CellIndex CellOf(double north_m, double east_m, double cell_size_m) {
-  return {.i = static_cast<std::int32_t>(std::floor(north_m / cell_size_m)),
-          .j = static_cast<std::int32_t>(std::floor(east_m / cell_size_m))};
+  return {.i = FloorToInt(north_m / cell_size_m),
+          .j = FloorToInt(east_m / cell_size_m)};
 }
 
 // Eq. 4.5, last line: index = j + i * num_y, the offset in the thesis's one
