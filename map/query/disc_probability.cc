@@ -105,6 +105,20 @@ double WindowEnd(const ScaledDisc& disc, double end, double level) {
   return y;
 }
 
+// How many midpoints the window needs.
+int Midpoints(const ScaledDisc& disc, double t_low, double t_high) {
+  // A disc that is small beside the normal: the integrand is cos^2 t times
+  // little more than exp(k sin t), k <= kappa. Measured over 60 000 seeded
+  // cases: worst relative errors 3e-9 with 8, 3e-9 with 12.
+  const double kappa =
+      disc.b * disc.b * (1.0 + disc.q) + disc.a * disc.a * (1.0 + disc.p);
+  if (kappa < 2.0) return 8;
+  if (kappa < 8.0) return 12;
+  if (t_high <= kNearPole && t_low >= -kNearPole) return kMidpoints;
+  return std::max(kMidpoints,
+                  static_cast<int>(1.5 * disc.a * (t_high - t_low)));
+}
+
 }  // namespace
 
 double NormalCdf(double x) {
@@ -128,7 +142,10 @@ double NormalInterval(double low, double high) {
            (0.5 * std::numbers::inv_sqrtpi * std::numbers::sqrt2) *
            (1.0 + (middle * middle - 1.0) * width * width / 24.0);
   }
-  if (high < 0.0 && width * -high > 40.0) return NormalCdf(high);
+  // Where the other end is below 1e-17 of the whole: (low^2 - high^2) / 2 > 40
+  // in one tail; beyond 8.5 sigma when the interval holds the middle.
+  const double squares = width * -(low + high);
+  if (high < 0.0 ? squares > 80.0 : low < -8.5) return NormalCdf(high);
   return NormalCdf(high) - NormalCdf(low);
 }
 
@@ -182,11 +199,7 @@ double DiscProbability(const Eigen::Vector2d& offset_m,
       WindowEnd(disc, std::min(farthest, disc.q + reach / disc.b), level);
   const double t_low = std::asin(std::max(-1.0, y_low));
   const double t_high = std::asin(std::min(1.0, y_high));
-  int midpoints = kMidpoints;
-  if (t_high > kNearPole || t_low < -kNearPole) {
-    midpoints =
-        std::max(midpoints, static_cast<int>(1.5 * disc.a * (t_high - t_low)));
-  }
+  const int midpoints = Midpoints(disc, t_low, t_high);
   const double spacing = (t_high - t_low) / midpoints;
 
   // Sine and cosine of the midpoints by turning one step at a time.

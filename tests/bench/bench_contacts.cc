@@ -1,0 +1,199 @@
+// What contacts and point queries cost in process: filters, the probability
+// over a disc, reports into the map, and answers with and without contacts.
+
+#include <benchmark/benchmark.h>
+
+#include <cmath>
+#include <cstdint>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "map/contacts/contact_map.h"
+#include "map/contacts/filter.h"
+#include "map/obstacle_map/obstacle_map.h"
+#include "map/query/disc_probability.h"
+#include "map/query/obstacle_query.h"
+#include "tests/map/obstacle_map/test_missions.h"
+
+namespace fathom::map {
+namespace {
+
+void StepFilter(benchmark::State& state, FilterKind kind) {
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  std::vector<PolarMeasurement> heard;
+  for (int i = 0; i < 1024; ++i) {
+    heard.push_back({.range_m = 5000 + 20 * normal(random),
+                     .azimuth_rad = 0.8 + 0.02 * normal(random),
+                     .range_std_m = 20,
+                     .azimuth_std_rad = 0.02});
+  }
+  TrackState track = FirstState(ConvertUnbiased(heard[0]), 8);
+  std::size_t i = 0;
+  for (auto _ : state) {
+    const PolarMeasurement& polar = heard[i++ & 1023];
+    track = Update(kind, Predict(track, 1.5, 2e-3),
+                   kind == FilterKind::kPerAxis ? ConvertPlain(polar)
+                                                : ConvertUnbiased(polar))
+                .state;
+    benchmark::DoNotOptimize(track);
+  }
+  state.SetItemsProcessed(state.iterations());
+}
+
+// Conversion, prediction and update of one report.
+void BM_FilterPerAxis(benchmark::State& state) {
+  StepFilter(state, FilterKind::kPerAxis);
+}
+BENCHMARK(BM_FilterPerAxis);
+
+void BM_FilterFourState(benchmark::State& state) {
+  StepFilter(state, FilterKind::kFourState);
+}
+BENCHMARK(BM_FilterFourState);
+
+// Sigmas from a tenth to ten times the radius, means out to four sigma.
+void BM_DiscProbability(benchmark::State& state) {
+  struct Case {
+    Eigen::Vector2d offset;
+    Eigen::Matrix2d covariance;
+  };
+  std::mt19937_64 random(2);
+  std::uniform_real_distribution<double> unit(0, 1);
+  std::vector<Case> cases(1024);
+  for (Case& one : cases) {
+    const double major = 100 * std::pow(10, -1 + 2 * unit(random));
+    const double minor = major * (0.2 + 0.8 * unit(random));
+    one.offset = {unit(random) * (100 + 4 * major),
+                  unit(random) * (100 + 4 * minor)};
+    const double both = 0.3 * minor * minor;
+    one.covariance << major * major, both, both, minor * minor;
+  }
+  std::size_t i = 0;
+  for (auto _ : state) {
+    const Case& one = cases[i++ & 1023];
+    benchmark::DoNotOptimize(DiscProbability(one.offset, one.covariance, 100));
+  }
+}
+BENCHMARK(BM_DiscProbability);
+
+ContactReport FixOf(int contact, int seconds, const GeodeticPoint& position) {
+  return {
+      .key = {.source = {"bench"}, .contact = {std::to_string(contact)}},
+      .contact_class = ContactClass::kVessel,
+      .time = At(seconds),
+      .observation = ContactFix{.position = position, .velocity_north_m_s = 3},
+      .depth_m = {},
+      .depth_std_m = {}};
+}
+
+// Reports into a list of contacts, a view after every 16.
+void BM_ApplyReport(benchmark::State& state) {
+  const int contacts = static_cast<int>(state.range(0));
+  ContactMap map(
+      ContactMapOptions{.max_contacts = static_cast<std::uint32_t>(contacts)});
+  std::vector<GeodeticPoint> sensors;
+  for (int i = 0; i < contacts; ++i) {
+    sensors.push_back(Place(100.0 * (i % 100), 100.0 * (i / 100)));
+    map.Apply(FixOf(i, 0, sensors.back()));
+  }
+  ContactReport report = FixOf(0, 0, sensors[0]);
+  int step = 0;
+  for (auto _ : state) {
+    const int i = step % contacts;
+    report.key.contact.value = std::to_string(i);
+    report.time = At(1 + step / contacts);
+    report.observation =
+        RangeBearing{.pose = {.position = sensors[static_cast<std::size_t>(i)]},
+                     .range_m = 1000,
+                     .bearing_deg = 0.1 * (step % 7),
+                     .range_std_m = 20,
+                     .bearing_std_deg = 1};
+    benchmark::DoNotOptimize(map.Apply(report));
+    if (++step % 16 == 0) benchmark::DoNotOptimize(map.View());
+  }
+  state.SetItemsProcessed(state.iterations());
+}
+BENCHMARK(BM_ApplyReport)->Arg(100)->Arg(10'000);
+
+// A warm mission: a chart everywhere, an activity with every tenth cell
+// measured, and `contacts` contacts of which each is at least 20 km away.
+ObstacleMap WarmMission(int contacts) {
+  MissionOptions options = SmallMission();
+  options.contacts.max_contacts = 20'000;
+  ObstacleMap map(options);
+  if (!map.Import(FlatChart(30, 4), true).ok()) std::abort();
+  if (!map.Start(Survey("a", EstimatorKind::kAdaptive)).ok()) std::abort();
+  for (int i = 0; i < 250; ++i) {
+    if (!map.ApplyPing(
+                HitAt("a", 2.0 * i, 37.0 * i - 500 * (37 * i / 500), 20, 1, i))
+             .ok()) {
+      std::abort();
+    }
+  }
+  for (int i = 0; i < contacts; ++i) {
+    map.ApplyContact(
+        FixOf(i, 0, Direct(kAreaSouthWest, 0.036 * i, 20'000 + 10.0 * i)));
+  }
+  return map;
+}
+
+void AskPoints(benchmark::State& state, const ObstacleMapView& view,
+               double step_m) {
+  std::vector<ObstacleQuery> queries;
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> unit(0, 1);
+  for (int i = 0; i < 1024; ++i) {
+    queries.push_back(
+        {.position = Place(step_m * unit(random), step_m * unit(random)),
+         .depth_m = 18,
+         .time = At(300)});
+  }
+  std::size_t i = 0;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(view.Answer(queries[i++ & 1023]));
+  }
+  state.SetItemsProcessed(state.iterations());
+}
+
+// The whole way: local map, global map, probability; no contacts. Points all
+// over the surveyed area.
+void BM_AnswerStatic(benchmark::State& state) {
+  ObstacleMap map = WarmMission(0);
+  AskPoints(state, *map.View(), 500);
+}
+BENCHMARK(BM_AnswerStatic);
+
+// The same with 10 000 contacts, none near.
+void BM_AnswerContactsFar(benchmark::State& state) {
+  ObstacleMap map = WarmMission(static_cast<int>(state.range(0)));
+  AskPoints(state, *map.View(), 500);
+}
+BENCHMARK(BM_AnswerContactsFar)->Arg(1)->Arg(10'000);
+
+// One contact that reaches every point.
+void BM_AnswerContactNear(benchmark::State& state) {
+  ObstacleMap map = WarmMission(0);
+  map.ApplyContact(FixOf(0, 0, Place(250, 250)));
+  AskPoints(state, *map.View(), 500);
+}
+BENCHMARK(BM_AnswerContactNear);
+
+// The query alone, the seabed given.
+void BM_AnswerAlone(benchmark::State& state) {
+  const ContactsView contacts;
+  const ObstacleQuery query{
+      .position = kAreaSouthWest, .depth_m = 18, .time = At(300)};
+  const SeabedEstimate seabed{.estimate = {.depth_m = 20,
+                                           .std_m = 2,
+                                           .kind = EvidenceKind::kMeasured,
+                                           .time_s = 1'767'225'600}};
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(Answer(query, seabed, contacts));
+  }
+}
+BENCHMARK(BM_AnswerAlone);
+
+}  // namespace
+}  // namespace fathom::map
