@@ -8,6 +8,7 @@
 #include <string>
 #include <variant>
 
+#include "map/geodesy/ned_frame.h"
 #include "tests/map/contacts/contact_testing.h"
 #include "tests/testing/status_matchers.h"
 
@@ -322,6 +323,49 @@ TEST(ContactMap, SensorsFarApartAgreeOnThePlace) {
     // What a plane shortens: 30 km^3 / (6 R^2) = 0.11 m.
     EXPECT_LT(DistanceM(estimate.Position(), truth), 0.2) << at_s;
   }
+}
+
+TEST(ContactMap, UncertaintyLiesAcrossTheTrueRayAtTheContact) {
+  ContactMap map(ContactMapOptions{.filter = FilterKind::kPerAxis});
+  const GeodeticPoint north{.latitude_deg = 65, .longitude_deg = 10};
+  // 30 km east at 65 N the meridians differ by 0.58 degree.
+  ContactReport report = Heard("a", 0, north, 30'000, 90);
+  const ContactEstimate estimate = *map.Apply(report).estimate;
+  // Across: 30 km * 1 degree = 524 m; along: 20 m. The minor axis points back
+  // to the sensor.
+  const double back_deg = Inverse(estimate.Position(), north).azimuth_deg;
+  EXPECT_NEAR(back_deg, -89.42, 0.01);
+  // The principal axis: tan 2a = 2 P01 / (P00 - P11), the minor one here.
+  const double major_rad =
+      0.5 *
+      std::atan2(2 * estimate.P(0, 1), estimate.P(0, 0) - estimate.P(1, 1));
+  EXPECT_NEAR(major_rad / kRadPerDeg, back_deg + 90, 0.005);
+}
+
+TEST(ContactMap, NewPlaneKeepsTheTrueCourse) {
+  ContactMap map(ContactMapOptions{});
+  const GeodeticPoint start{.latitude_deg = 70, .longitude_deg = 5};
+  ContactReport fix = Fix("a", 0, start, 3, 20);
+  fix.contact_class = ContactClass::kDrifting;  // Stale after an hour only.
+  std::get<ContactFix>(fix.observation).velocity_std_m_s = 0.01;
+  map.Apply(fix);
+  const ContactEstimate before = *map.View().At(Key("a"), AtS(3600));
+  const double north_rad =
+      NedFrame(before.frame_origin).NorthAzimuthRad(before.Position());
+  // 72 km east at 70 N: -72 / 6371 * tan(70) = -1.78 degrees.
+  EXPECT_NEAR(north_rad / kRadPerDeg, -1.78, 0.02);
+  // A report that says next to nothing.
+  ContactReport vague = Heard("a", 3600, before.Position(), 1, 0);
+  vague.contact_class = ContactClass::kDrifting;
+  auto& heard = std::get<RangeBearing>(vague.observation);
+  heard.range_std_m = 1e5;
+  heard.pose.position_std_m = 1e5;
+  const ContactEstimate after = *map.Apply(vague).estimate;
+  ASSERT_NE(after.frame_origin, start);
+  EXPECT_LT(DistanceM(after.frame_origin, before.Position()), 1e-3);
+  const double course_rad = std::atan2(before.x(3), before.x(2)) - north_rad;
+  EXPECT_NEAR(std::atan2(after.x(3), after.x(2)), course_rad, 1e-4);
+  EXPECT_NEAR(after.x.tail<2>().norm(), before.x.tail<2>().norm(), 1e-2);
 }
 
 TEST(ContactMap, LongVoyageMovesThePlaneAlong) {
