@@ -1,10 +1,6 @@
 #include "storage/mission_file.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -18,6 +14,7 @@
 #include "base/status_macros.h"
 #include "storage/checkpoint_writer.h"
 #include "storage/contact_table.h"
+#include "storage/draft_file.h"
 #include "storage/file_lock.h"
 #include "storage/journal_codec.h"
 #include "storage/loader.h"
@@ -52,65 +49,6 @@ std::string CanonicalPath(const std::string& path) {
   const fs::path canonical = fs::weakly_canonical(path, error);
   return error ? path : canonical.string();
 }
-
-absl::Status SyncFolderOf(const std::string& path) {
-  const std::string folder = fs::path(path).parent_path().string();
-  const int descriptor = open(folder.empty() ? "." : folder.c_str(),
-                              O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) {
-    return absl::ErrnoToStatus(errno, absl::StrFormat("open %s", folder));
-  }
-  const int result = fsync(descriptor);
-  const int error = errno;
-  close(descriptor);
-  if (result == 0) return absl::OkStatus();
-  return absl::ErrnoToStatus(error, absl::StrFormat("fsync %s", folder));
-}
-
-// An unfinished file that is made under another name: removed unless it gets
-// its own.
-class Draft {
- public:
-  explicit Draft(const std::string& target)
-      : target_(target), path_(target + ".new") {
-    Remove();  // Left by a crash.
-  }
-  Draft(const Draft&) = delete;
-  Draft& operator=(const Draft&) = delete;
-  ~Draft() { Remove(); }
-
-  const std::string& path() const { return path_; }
-
-  // Gives the finished file its name, durably.
-  absl::Status Publish() {
-    FATHOM_RETURN_IF_ERROR(CheckAbsent(target_));
-    std::error_code error;
-    fs::rename(path_, target_, error);
-    if (error) {
-      return absl::ErrnoToStatus(error.value(),
-                                 absl::StrFormat("rename %s", path_));
-    }
-    return SyncFolderOf(target_);
-  }
-
-  static absl::Status CheckAbsent(const std::string& path) {
-    std::error_code error;
-    if (!fs::exists(fs::symlink_status(path, error))) return absl::OkStatus();
-    return absl::AlreadyExistsError(
-        absl::StrFormat("%s exists; choose another name", path));
-  }
-
- private:
-  void Remove() {
-    std::error_code ignored;
-    for (const char* suffix : {"", "-wal", "-shm", "-journal"}) {
-      fs::remove(path_ + suffix, ignored);
-    }
-  }
-
-  std::string target_;
-  std::string path_;
-};
 
 std::uint64_t SizeOf(const std::string& path) {
   std::error_code error;
@@ -439,11 +377,11 @@ absl::Status MissionFile::Impl::ReadContactHistory(
 absl::StatusOr<std::uint64_t> MissionFile::Impl::SaveCopy(
     const std::string& path) {
   const std::string target = CanonicalPath(path);
-  FATHOM_RETURN_IF_ERROR(Draft::CheckAbsent(target));
+  FATHOM_RETURN_IF_ERROR(CheckAbsent(target));
   FATHOM_ASSIGN_OR_RETURN(const FileLock lock, FileLock::Acquire(target));
   // A connection of its own: a long copy keeps no history reader waiting.
   FATHOM_ASSIGN_OR_RETURN(Connection reader, OpenReader());
-  Draft draft(target);
+  DraftFile draft(target);
   FATHOM_RETURN_IF_ERROR(reader.BackupTo(draft.path()));
   FATHOM_RETURN_IF_ERROR(draft.Publish());
   return SizeOf(target);
@@ -470,9 +408,9 @@ absl::StatusOr<std::unique_ptr<MissionFile>> MissionFile::Create(
                           NormalMetadata(metadata));
   const std::string target = CanonicalPath(path);
   FATHOM_ASSIGN_OR_RETURN(FileLock lock, FileLock::Acquire(target));
-  FATHOM_RETURN_IF_ERROR(Draft::CheckAbsent(target));
+  FATHOM_RETURN_IF_ERROR(CheckAbsent(target));
   {
-    Draft draft(target);
+    DraftFile draft(target);
     FATHOM_ASSIGN_OR_RETURN(
         Connection connection,
         Connection::Open(draft.path(), Connection::Mode::kCreate));
