@@ -22,7 +22,7 @@ namespace fathom::server {
 // Where and for whom to listen.
 struct ListenOptions {
   // "HOST:PORT" (port 0: any free one) or "unix:PATH".
-  std::string address = "127.0.0.1:7471";
+  std::string address = "127.0.0.1:7430";
   // PEM files; all three or none.
   std::string tls_cert;
   std::string tls_key;
