@@ -142,29 +142,29 @@ void DiffContacts(const ContactsView& before, const ContactsView& now,
   Walk old_walk(*before.set_);
   Walk new_walk(*now.set_);
   while (!old_walk.done() || !new_walk.done()) {
-    if (new_walk.done()) {
-      gone(old_walk.contact().key());
-      old_walk.Next();
-    } else if (old_walk.done()) {
-      changed(new_walk.contact());
-      new_walk.Next();
-    } else if (old_walk.at_block_start() && new_walk.at_block_start() &&
-               old_walk.block() == new_walk.block()) {
+    const bool both = !old_walk.done() && !new_walk.done();
+    if (both && old_walk.at_block_start() && new_walk.at_block_start() &&
+        old_walk.block() == new_walk.block()) {
       old_walk.NextBlock();
       new_walk.NextBlock();
-    } else if (old_walk.contact().key() < new_walk.contact().key()) {
+      continue;
+    }
+    const bool only_old =
+        both ? old_walk.contact().key() < new_walk.contact().key()
+             : new_walk.done();
+    const bool only_new =
+        both ? new_walk.contact().key() < old_walk.contact().key()
+             : old_walk.done();
+    if (only_old) {
       gone(old_walk.contact().key());
       old_walk.Next();
-    } else if (new_walk.contact().key() < old_walk.contact().key()) {
-      changed(new_walk.contact());
-      new_walk.Next();
-    } else {
-      if (&old_walk.contact() != &new_walk.contact()) {
-        changed(new_walk.contact());
-      }
-      old_walk.Next();
-      new_walk.Next();
+      continue;
     }
+    if (only_new || &old_walk.contact() != &new_walk.contact()) {
+      changed(new_walk.contact());
+    }
+    if (!only_new) old_walk.Next();
+    new_walk.Next();
   }
 }
 

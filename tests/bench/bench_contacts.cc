@@ -95,7 +95,7 @@ void BM_ApplyReport(benchmark::State& state) {
       ContactMapOptions{.max_contacts = static_cast<std::uint32_t>(contacts)});
   std::vector<GeodeticPoint> sensors;
   for (int i = 0; i < contacts; ++i) {
-    sensors.push_back(Place(100.0 * (i % 100), 100.0 * (i / 100)));
+    sensors.push_back(Place(100.0 * (i % 100), 1.0 * i));
     map.Apply(FixOf(i, 0, sensors.back()));
   }
   ContactReport report = FixOf(0, 0, sensors[0]);
@@ -126,8 +126,7 @@ ObstacleMap WarmMission(int contacts) {
   if (!map.Import(FlatChart(30, 4), true).ok()) std::abort();
   if (!map.Start(Survey("a", EstimatorKind::kAdaptive)).ok()) std::abort();
   for (int i = 0; i < 250; ++i) {
-    if (!map.ApplyPing(
-                HitAt("a", 2.0 * i, 37.0 * i - 500 * (37 * i / 500), 20, 1, i))
+    if (!map.ApplyPing(HitAt("a", 2.0 * i, 1.0 * ((37 * i) % 500), 20, 1, i))
              .ok()) {
       std::abort();
     }

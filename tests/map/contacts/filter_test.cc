@@ -243,7 +243,8 @@ TEST(Update, MatchesTheReferenceStep) {
         state.x(order[r]) = n.at(static_cast<std::size_t>(r));
         for (int c = 0; c < 4; ++c) {
           state.P(order[r], order[c]) =
-              n.at(static_cast<std::size_t>(4 + 4 * r + c));
+              n.at(4 + 4 * static_cast<std::size_t>(r) +
+                   static_cast<std::size_t>(c));
         }
       }
     }
