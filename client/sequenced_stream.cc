@@ -354,6 +354,9 @@ absl::Status SequencedStream::Resume(SteadyTime deadline) {
 
 absl::Status SequencedStream::Flush() {
   MutexLock lock(mutex_);
+  // A Send may have met the end of the stream and taken nothing: what was
+  // taken is durable, but the caller must not read that as success.
+  if (!permanent_.ok()) return permanent_;
   const std::uint64_t last = buffer_.last_sequence();
   return WaitUntil([&]() { return buffer_.durable_sequence() >= last; });
 }
