@@ -14,10 +14,14 @@
 namespace fathom::map {
 namespace {
 
-// Positions of a block of `words`, as a power of two.
+// Positions of a block, as a power of two.
 constexpr unsigned kBlockBits = 6;
 // Slots of this level fill a block; deeper ones divide it.
 constexpr int kBlockLevel = 3;
+
+// Fields of a divided block's bits.
+constexpr unsigned kQuarterShift = 16;
+constexpr unsigned kRankShift = 20;
 
 // What an allocator adds to a block of memory, near enough.
 constexpr std::size_t kAllocationBytes = 16;
@@ -52,16 +56,18 @@ void StoreAs(std::byte* to, T value) {
 
 }  // namespace
 
-// Where a slot was found: in `starts`, whose bits stand for cells `finest`
-// levels below the root, it covers bit `bit`. A slot's length is the distance
-// between its own bit and the next.
+// Where a slot was found.
 struct Tile::Rank {
   std::uint32_t slot;
-  unsigned bit;
+  // Levels below the tile's root if it lies in a divided block, else 0.
+  int inner_level;
+  // Else: all leaves and divided blocks begin at these bits, and the slot
+  // covers this one. Its length is the distance to the next.
   std::uint64_t starts;
-  int finest;
+  unsigned bit;
 
   int Level() const {
+    if (inner_level != 0) return inner_level;
     const unsigned first =
         63u - static_cast<unsigned>(std::countl_zero(starts & UpTo(bit)));
     // A shift by 64 is undefined, so by `first` and by one.
@@ -69,7 +75,7 @@ struct Tile::Rank {
     const unsigned length =
         rest == 0 ? 64 - first
                   : 1 + static_cast<unsigned>(std::countr_zero(rest));
-    return finest - static_cast<int>(std::bit_width(length) - 1) / 2;
+    return kBlockLevel - static_cast<int>(std::bit_width(length) - 1) / 2;
   }
 };
 
@@ -80,10 +86,11 @@ std::shared_ptr<const Tile> Tile::Build(
   // The shape.
   std::uint64_t whole = 0;
   std::uint64_t divided = 0;
-  std::array<std::uint64_t, 64> words;
-  std::array<std::uint16_t, 65> ranks;
+  // One more than there can be divided blocks: the rank of the end. It is not
+  // needed, and may not fit, if all blocks are divided.
+  std::array<std::uint32_t, 65> blocks;
   std::size_t block_count = 0;
-  ranks[0] = 0;
+  std::uint32_t inner_leaves = 0;
   std::uint32_t position = 0;
   for (const std::uint8_t level : levels) {
     const std::uint32_t block = position >> kBlockBits;
@@ -92,32 +99,47 @@ std::shared_ptr<const Tile> Tile::Build(
     } else {
       if ((position & 63) == 0) {
         divided |= std::uint64_t{1} << block;
-        words[block_count] = 0;
-        ranks[block_count + 1] = ranks[block_count];
-        ++block_count;
+        blocks[block_count++] = inner_leaves << kRankShift;
       }
-      words[block_count - 1] |= std::uint64_t{1} << (position & 63);
-      ++ranks[block_count];
+      std::uint32_t& bits = blocks[block_count - 1];
+      if (level >= 5) bits |= 1u << (kQuarterShift + ((position >> 4) & 3));
+      if (level == 6) bits |= 1u << ((position >> 2) & 15);
+      ++inner_leaves;
     }
     position += SpanOf(level);
   }
+  blocks[block_count] = inner_leaves << kRankShift;
 
   const std::size_t slots = levels.size();
   const bool residuals =
       std::any_of(leaves.begin(), leaves.end(),
                   [](const Leaf& leaf) { return leaf.residual_code != 0; });
+  // Charts and quick surveys: one time for all.
+  const auto first_known =
+      std::find_if(leaves.begin(), leaves.end(),
+                   [](const Leaf& leaf) { return leaf.known(); });
+  const std::uint32_t time_s =
+      first_known == leaves.end() ? 0 : first_known->time_s;
+  const bool one_time =
+      children.empty() &&
+      std::all_of(leaves.begin(), leaves.end(), [time_s](const Leaf& leaf) {
+        return !leaf.known() || leaf.time_s == time_s;
+      });
+  const std::size_t record_bytes = one_time ? kTimelessBytes : kRecordBytes;
   const std::size_t bytes_behind =
-      children.size() * sizeof(Child) + block_count * kBlockBytes +
-      sizeof(std::uint16_t) + slots * (kRecordBytes + (residuals ? 1u : 0u));
+      children.size() * sizeof(Child) + (block_count + 1) * kBlockBytes +
+      slots * (record_bytes + (residuals ? 1u : 0u));
   std::shared_ptr<Tile> tile(new (bytes_behind) Tile(key));
   tile->whole_ = whole;
   tile->divided_ = divided;
   tile->slot_count_ = static_cast<std::uint16_t>(slots);
+  tile->record_bytes_ = static_cast<std::uint8_t>(record_bytes);
+  tile->time_s_ = one_time ? time_s : 0;
   tile->has_residuals_ = residuals;
   tile->blocks_at_ = static_cast<std::uint32_t>(
       sizeof(Tile) + children.size() * sizeof(Child));
   tile->records_at_ = static_cast<std::uint32_t>(
-      tile->blocks_at_ + block_count * kBlockBytes + sizeof(std::uint16_t));
+      tile->blocks_at_ + (block_count + 1) * kBlockBytes);
 
   std::byte* to = reinterpret_cast<std::byte*>(tile.get() + 1);
   for (Child& child : children) {
@@ -125,20 +147,17 @@ std::shared_ptr<const Tile> Tile::Build(
     ++tile->child_count_;
     to += sizeof(Child);
   }
-  for (std::size_t k = 0; k < block_count; ++k) {
-    StoreAs(to, ranks[k]);
-    StoreAs(to + sizeof(std::uint16_t), words[k]);
+  for (std::size_t k = 0; k <= block_count; ++k) {
+    StoreAs(to, blocks[k]);
     to += kBlockBytes;
   }
-  StoreAs(to, ranks[block_count]);
-  to += sizeof(std::uint16_t);
   std::uint32_t child = 0;
   for (const Leaf& leaf : leaves) {
     const bool is_child = leaf.std_code == kChildCode;
     StoreAs(to, is_child ? 0.0f : leaf.depth_m);
-    StoreAs(to + 4, is_child ? child++ : leaf.time_s);
-    StoreAs(to + 8, leaf.std_code);
-    to += kRecordBytes;
+    StoreAs(to + 4, leaf.std_code);
+    if (!one_time) StoreAs(to + 6, is_child ? child++ : leaf.time_s);
+    to += record_bytes;
   }
   if (residuals) {
     for (const Leaf& leaf : leaves) {
@@ -183,26 +202,38 @@ inline Tile::Rank Tile::RankOf(std::uint32_t position) const {
   const unsigned block = position >> kBlockBits;
   const std::uint64_t up_to = UpTo(block);
   const unsigned wholes = static_cast<unsigned>(std::popcount(whole_ & up_to));
-  unsigned k = static_cast<unsigned>(std::popcount(divided_ & up_to));
+  const unsigned k = static_cast<unsigned>(std::popcount(divided_ & up_to));
   if ((divided_ >> block) & 1) {
-    const std::byte* const from = Block(--k);
-    const auto word = LoadAs<std::uint64_t>(from + sizeof(std::uint16_t));
-    const unsigned inner = position & 63;
-    return {.slot = wholes + LoadAs<std::uint16_t>(from) +
-                    static_cast<unsigned>(std::popcount(word & UpTo(inner))) -
-                    1,
-            .bit = inner,
-            .starts = word,
-            .finest = kTileLevels};
+    const auto bits = LoadAs<std::uint32_t>(Block(k - 1));
+    const std::uint32_t quarter = (position >> 4) & 3;
+    const std::uint32_t patch = (position >> 2) & 15;
+    const std::uint32_t in_quarters = (bits >> (kQuarterShift + quarter)) & 1;
+    const std::uint32_t in_fours = (bits >> patch) & 1;
+    const std::uint32_t before =
+        ((1u << patch) - 1) | (((1u << quarter) - 1) << kQuarterShift);
+    return {.slot = wholes + (bits >> kRankShift) + quarter +
+                    3 * static_cast<unsigned>(std::popcount(bits & before)) +
+                    in_quarters * (patch & 3) + in_fours * (position & 3),
+            .inner_level =
+                kBlockLevel + 1 + static_cast<int>(in_quarters + in_fours),
+            .starts = 0,
+            .bit = 0};
   }
-  return {.slot = wholes + LoadAs<std::uint16_t>(Block(k)) - 1,
-          .bit = block,
+  const auto bits = LoadAs<std::uint32_t>(Block(k));
+  return {.slot = wholes + (bits >> kRankShift) - 1,
+          .inner_level = 0,
           .starts = whole_ | divided_,
-          .finest = kBlockLevel};
+          .bit = block};
 }
 
 int Tile::LevelOf(std::uint32_t position) const {
   return RankOf(position).Level();
+}
+
+inline std::uint32_t Tile::TimeOf(const std::byte* record,
+                                  std::uint16_t std_code) const {
+  if (record_bytes_ == kRecordBytes) return LoadAs<std::uint32_t>(record + 6);
+  return (std_code >> 14) == 0 ? 0 : time_s_;
 }
 
 Tile::Found Tile::Descend(const Tile& root, std::uint32_t row,
@@ -215,13 +246,13 @@ Tile::Found Tile::Descend(const Tile& root, std::uint32_t row,
         kSpread[(col >> shift) & (kTileSide - 1)];
     const Rank rank = tile->RankOf(position);
     const std::byte* const record = tile->Record(rank.slot);
-    const auto std_code = LoadAs<std::uint16_t>(record + 8);
+    const auto std_code = LoadAs<std::uint16_t>(record + 4);
     if (std_code != kChildCode) {
       // Field by field: a copy of the struct would wait for its parts to leave
       // the store buffer (40 ns a query).
       Found found;
       found.leaf.depth_m = LoadAs<float>(record);
-      found.leaf.time_s = LoadAs<std::uint32_t>(record + 4);
+      found.leaf.time_s = tile->TimeOf(record, std_code);
       found.leaf.std_code = std_code;
       if (tile->has_residuals_) {
         found.leaf.residual_code = static_cast<std::uint8_t>(
@@ -230,7 +261,7 @@ Tile::Found Tile::Descend(const Tile& root, std::uint32_t row,
       found.level = tile->key_.level + rank.Level();
       return found;
     }
-    tile = tile->Children()[LoadAs<std::uint32_t>(record + 4)].get();
+    tile = tile->Children()[LoadAs<std::uint32_t>(record + 6)].get();
     shift -= kTileLevels;
   }
 }
@@ -240,28 +271,29 @@ Tile::Found Tile::Find(std::uint32_t position) const {
   const Rank rank = RankOf(position);
   found.level = rank.Level();
   found.leaf = LeafAt(rank.slot);
-  if (found.leaf.std_code == kChildCode) {
-    found.child = Children()[found.leaf.time_s].get();
+  if (IsChild(rank.slot)) {
+    found.child = ChildAt(rank.slot).get();
   }
   return found;
 }
 
 Leaf Tile::LeafAt(std::uint32_t slot) const {
   const std::byte* const record = Record(slot);
+  const auto std_code = LoadAs<std::uint16_t>(record + 4);
   return {.depth_m = LoadAs<float>(record),
-          .time_s = LoadAs<std::uint32_t>(record + 4),
-          .std_code = LoadAs<std::uint16_t>(record + 8),
+          .time_s = std_code == kChildCode ? 0 : TimeOf(record, std_code),
+          .std_code = std_code,
           .residual_code = has_residuals_ ? static_cast<std::uint8_t>(
                                                 *(Record(slot_count_) + slot))
                                           : std::uint8_t{0}};
 }
 
 bool Tile::IsChild(std::uint32_t slot) const {
-  return LoadAs<std::uint16_t>(Record(slot) + 8) == kChildCode;
+  return LoadAs<std::uint16_t>(Record(slot) + 4) == kChildCode;
 }
 
 const std::shared_ptr<const Tile>& Tile::ChildAt(std::uint32_t slot) const {
-  return Children()[LoadAs<std::uint32_t>(Record(slot) + 4)];
+  return Children()[LoadAs<std::uint32_t>(Record(slot) + 6)];
 }
 
 bool Tile::SameSlots(const Tile& other) const {
@@ -282,7 +314,7 @@ TileContent Tile::Content() const {
     content.levels.push_back(static_cast<std::uint8_t>(level));
     content.depths_m.push_back(leaf.depth_m);
     content.std_codes.push_back(leaf.std_code);
-    content.times_s.push_back(leaf.std_code == kChildCode ? 0 : leaf.time_s);
+    content.times_s.push_back(leaf.time_s);
     if (has_residuals_) {
       content.residual_codes.push_back(leaf.residual_code);
     }

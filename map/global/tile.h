@@ -1,21 +1,23 @@
 // Tile: an immutable piece of the quadtree, six levels deep, without pointers
 // inside it.
 //
-// The leaves of a tile, in Z-order, are an array. Which of the 64 x 64
-// positions belongs to which leaf is told by one bit per position, set where a
-// leaf begins: a leaf's index is the number of set bits up to the position,
-// less one (its rank), and its size the distance to the next set bit. The bits
-// come in two layers, so that large leaves cost nothing below them:
+// The leaves of a tile, in Z-order, are an array. Which leaf covers a position
+// is told by bits, in two layers, so that large leaves cost nothing below them:
 //
 //   whole    64 bits, one for each block of 8 x 8 positions: a leaf of that
 //            size or larger begins here
-//   divided  64 bits: the block holds smaller leaves; it has
-//   word     of each divided block, 64 bits: a leaf begins at this position
-//   rank     of each divided block, 16 bits: leaves in those before it
+//   divided  64 bits: the block holds smaller leaves; it then has 32 bits:
+//     0-15     the 2 x 2 positions at this place are four leaves
+//     16-19    the quarter of the block is divided
+//     20-31    its rank: leaves in the divided blocks before it
 //
-// Finding a leaf costs three population counts and no loop, against one
-// dependent step per level in a tree of nodes (see docs/adr/0002). A full tile
-// of 4096 leaves spends 0.16 bytes a leaf on its shape.
+// A leaf's index is the number of leaves that begin before it: the bits of
+// `whole` up to its block, the rank, and, as every division puts four leaves in
+// the place of one, three for every set bit before it in the block. That is
+// three population counts and no loop, against one dependent step per level in
+// a tree of nodes (see docs/adr/0002). A full tile of 4096 leaves spends 0.06
+// bytes a leaf on its shape; no tile more than 1 byte (4 leaves a block), its
+// header of 100 bytes aside.
 //
 // A slot of the finest size may hold a whole tile in place of a leaf; so does
 // the tree reach from level 0 to 24 in four tiles. Tiles are shared between
@@ -144,14 +146,16 @@ class Tile {
  private:
   // The tile is one allocation: this object, and behind it
   //   children shared pointers in Z-order
-  //   blocks   for each divided block its rank (2 bytes) and word (8 bytes)
-  //   2 bytes  the rank behind the last block: all leaves in divided blocks
-  //   records  for each slot depth, time and code (10 bytes)
+  //   blocks   for each divided block its 32 bits; and one more rank, that of
+  //            the end
+  //   records  for each slot depth, code and time (10 bytes); without time (6
+  //            bytes) where all known leaves have one time and none is a child
   //   residual codes, one byte for each slot, unless all are 0
   // Fields lie at even addresses and are read with memcpy. A leaf is found in
   // three lines of cache: this object's first, a block's, a record's.
-  static constexpr std::size_t kBlockBytes = 10;
+  static constexpr std::size_t kBlockBytes = 4;
   static constexpr std::size_t kRecordBytes = 10;
+  static constexpr std::size_t kTimelessBytes = 6;
 
   explicit Tile(const TileKey& key) : key_(key) {}
   static void* operator new(std::size_t size, std::size_t bytes_behind) {
@@ -166,6 +170,8 @@ class Tile {
   struct Rank;
   Rank RankOf(std::uint32_t position) const;
   int LevelOf(std::uint32_t position) const;
+  // The time of a leaf with the given record and code.
+  std::uint32_t TimeOf(const std::byte* record, std::uint16_t std_code) const;
 
   using Child = std::shared_ptr<const Tile>;
   const Child* Children() const {
@@ -177,12 +183,12 @@ class Tile {
   }
   const std::byte* Record(std::size_t slot) const {
     return reinterpret_cast<const std::byte*>(this) + records_at_ +
-           slot * kRecordBytes;
+           slot * record_bytes_;
   }
   // From the blocks to the end.
   std::size_t ByteCount() const {
     return records_at_ - blocks_at_ +
-           slot_count_ * (kRecordBytes + (has_residuals_ ? 1u : 0u));
+           slot_count_ * (record_bytes_ + (has_residuals_ ? 1u : 0u));
   }
 
   std::uint64_t whole_ = 0;
@@ -192,8 +198,11 @@ class Tile {
   std::uint32_t records_at_ = 0;
   std::uint16_t slot_count_ = 0;
   std::uint16_t child_count_ = 0;
+  std::uint8_t record_bytes_ = kRecordBytes;
   bool has_residuals_ = false;
   mutable bool settled_ = false;
+  // Of all known leaves, if the records hold none.
+  std::uint32_t time_s_ = 0;
   TileKey key_;
   TileTotals totals_;
 };

@@ -13,10 +13,12 @@ WorkTile::WorkTile(const TileKey& its_key, const Leaf& leaf)
 }
 
 WorkTile::WorkTile(const Tile& tile) : key(tile.key()) {
+  std::uint32_t next_child = 0;
   tile.ForEachSlot([&](std::uint32_t position, std::uint32_t slot, int level) {
     std::memset(&levels[position], level, SpanOf(level));
     leaves[position] = tile.LeafAt(slot);
-    // A child's index is its number in Z-order: the same here.
+    // Children are numbered in Z-order.
+    if (tile.IsChild(slot)) leaves[position].time_s = next_child++;
   });
   children.reserve(tile.children().size());
   for (const std::shared_ptr<const Tile>& child : tile.children()) {

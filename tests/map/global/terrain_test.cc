@@ -74,7 +74,9 @@ class TerrainTest : public ::testing::Test {
       if (i < 0 || i >= rows || j < 0 || j >= columns) return std::nullopt;
       const float depth_m = terrain_.At(row + i, col + j);
       if (std::isnan(depth_m)) return std::nullopt;
-      return Measured(depth_m, 0.3f);
+      // Surveyed in lines, a second a cell: no two times are alike.
+      return Measured(depth_m, 0.3f,
+                      static_cast<std::uint32_t>(1'000'000 + rows * j + i));
     };
   }
 

@@ -89,9 +89,23 @@ TEST(Tile, AFullOneSpendsLittleOnItsShape) {
   const Slots slots = RandomSlots(1, 1.0);
   const auto tile = slots.Build();
   ASSERT_EQ(tile->slot_count(), 4096u);
-  // 10 B a leaf; 64 blocks of 10 B, 2 B, the tile itself and two allocations:
-  // (40960 + 642 + 96 + 56) / 4096 = 10.2.
-  EXPECT_LT(static_cast<double>(tile->totals().memory_bytes) / 4096, 10.25);
+  // 6 B a leaf as all have one time; 65 blocks of 4 B, the tile itself and two
+  // allocations: (24576 + 260 + 104 + 56) / 4096 = 6.1.
+  EXPECT_LT(static_cast<double>(tile->totals().memory_bytes) / 4096, 6.11);
+}
+
+TEST(Tile, TimesThatDifferCostFourBytesALeaf) {
+  Slots slots = RandomSlots(1, 1.0);
+  const auto one = slots.Build();
+  EXPECT_EQ(one->LeafAt(100).time_s, 7u);
+  EXPECT_EQ(one->LeafAt(6).time_s, 0u);  // Unknown.
+  slots.leaves[100].time_s = 9;
+  const auto two = slots.Build();
+  EXPECT_EQ(two->totals().memory_bytes - one->totals().memory_bytes,
+            4u * 4096u);
+  EXPECT_EQ(two->LeafAt(100).time_s, 9u);
+  EXPECT_EQ(two->LeafAt(101).time_s, 7u);
+  EXPECT_FALSE(one->SameSlots(*two));
 }
 
 TEST(Tile, KeepsResidualsOnlyWhereThereAreAny) {
