@@ -1,0 +1,203 @@
+// MapKeeper's storage thread: commits what waits in one transaction, tells who
+// waits that it is durable, and handles a disk that refuses.
+#include <algorithm>
+#include <iterator>
+#include <type_traits>
+
+#include "absl/strings/str_format.h"
+#include "base/status_macros.h"
+#include "server/map_keeper.h"
+
+namespace fathom::server {
+namespace {
+
+// How long the storage thread is idle before it does housekeeping.
+constexpr std::chrono::milliseconds kIdleTime{1000};
+
+}  // namespace
+
+bool MapKeeper::TakeItems(std::vector<StorageItem>& items) {
+  bool idle_told = false;
+  while (true) {
+    bool idle = false;
+    {
+      MutexLock lock(mutex_);
+      while (to_store_.empty() && !mapper_ended_ && !idle) {
+        if (idle_told) {
+          storage_changed_.Wait(mutex_);
+        } else {
+          idle = !storage_changed_.WaitFor(mutex_, kIdleTime);
+        }
+      }
+      if (!to_store_.empty()) {
+        items.swap(to_store_);
+        return true;
+      }
+      if (mapper_ended_) return false;
+    }
+    store_.Idle();
+    idle_told = true;
+  }
+}
+
+void MapKeeper::RunStorage() {
+  std::vector<StorageItem> items;
+  absl::Status status;
+  while (TakeItems(items)) {
+    if (status.ok()) status = CommitItems(items);
+    if (status.ok()) {
+      TellDurable(items);
+    } else {
+      GiveUp(status, items);
+    }
+    items.clear();
+  }
+}
+
+absl::Status MapKeeper::CommitItems(std::vector<StorageItem>& items) {
+  size_t begin = 0;
+  while (begin < items.size()) {
+    // Up to and with the next checkpoint, which covers what is before it.
+    storage::Batch batch;
+    ViewPtr checkpoint;
+    size_t records = 0;
+    size_t end = begin;
+    for (; end < items.size() && checkpoint == nullptr; ++end) {
+      StorageItem& item = items[end];
+      if (item.contact_estimate.has_value()) {
+        batch.contact_history.push_back(
+            {.revision = item.record->revision,
+             .estimate = *std::move(item.contact_estimate)});
+      }
+      if (item.record.has_value()) {
+        batch.journal.push_back(*std::move(item.record));
+        records += 1;
+      }
+      if (item.position.has_value()) {
+        batch.source_positions.push_back(*std::move(item.position));
+      }
+      checkpoint = item.checkpoint;
+    }
+    if (checkpoint != nullptr) {
+      batch.checkpoint =
+          storage::Checkpoint{.now = checkpoint, .previous = saved_view_};
+    }
+    FATHOM_RETURN_IF_ERROR(CommitBatch(batch, items));
+    if (checkpoint != nullptr) saved_view_ = std::move(checkpoint);
+    {
+      MutexLock lock(mutex_);
+      storage_.durable_revision = items[end - 1].revision;
+      storage_.journal_records =
+          batch.checkpoint.has_value() ? 0 : storage_.journal_records + records;
+    }
+    begin = end;
+  }
+  return absl::OkStatus();
+}
+
+absl::Status MapKeeper::CommitBatch(const storage::Batch& batch,
+                                    const std::vector<StorageItem>& items) {
+  while (true) {
+    const absl::Status status = store_.Commit(batch);
+    if (!absl::IsResourceExhausted(status)) {
+      if (status.ok()) {
+        MutexLock lock(mutex_);
+        storage_.fault.clear();
+      } else {
+        EnterFault(status, items);
+      }
+      return status;
+    }
+    EnterFault(status, items);
+    MutexLock lock(mutex_);
+    // One failed attempt after stopping began is the last.
+    if (stopping_) return status;
+    storage_changed_.WaitFor(mutex_, options_.storage_retry_delay);
+  }
+}
+
+void MapKeeper::EnterFault(const absl::Status& status,
+                           const std::vector<StorageItem>& items) {
+  std::vector<std::shared_ptr<IngestListener>> listeners;
+  {
+    MutexLock lock(mutex_);
+    const bool first = storage_.fault.empty();
+    storage_.fault = std::string(status.message());
+    if (storage_.fault.empty()) storage_.fault = status.ToString();
+    if (!first) return;
+    listeners.swap(waiting_);
+  }
+  for (const StorageItem& item : items) {
+    if (item.listener != nullptr) listeners.push_back(item.listener);
+  }
+  std::sort(listeners.begin(), listeners.end());
+  listeners.erase(std::unique(listeners.begin(), listeners.end()),
+                  listeners.end());
+  for (const auto& listener : listeners) listener->OnFault();
+}
+
+void MapKeeper::TellDurable(std::vector<StorageItem>& items) {
+  size_t messages = 0;
+  size_t bytes = 0;
+  size_t commands = 0;
+  // One a listener, in the order of first appearance; few.
+  struct Durable {
+    std::shared_ptr<IngestListener> listener;
+    MessageNumber newest;
+    size_t count = 0;
+  };
+  std::vector<Durable> durable;
+  for (StorageItem& item : items) {
+    if (item.listener != nullptr) {
+      messages += 1;
+      bytes += item.bytes;
+      auto found = std::find_if(durable.begin(), durable.end(),
+                                [&](const Durable& entry) {
+                                  return entry.listener == item.listener;
+                                });
+      if (found == durable.end()) {
+        found = durable.insert(found, {.listener = std::move(item.listener),
+                                       .newest = item.number,
+                                       .count = 0});
+      }
+      found->newest = item.number;
+      found->count += 1;
+    } else if (item.done) {
+      commands += 1;
+    }
+  }
+  for (const Durable& entry : durable) {
+    entry.listener->OnDurable(entry.newest, entry.count);
+  }
+  for (const StorageItem& item : items) {
+    if (item.done) item.done(absl::OkStatus());
+  }
+  std::vector<std::shared_ptr<IngestListener>> waiting;
+  {
+    MutexLock lock(mutex_);
+    pending_messages_ -= messages;
+    pending_bytes_ -= bytes;
+    pending_commands_ -= commands;
+    if (HasRoom()) waiting.swap(waiting_);
+  }
+  for (const auto& listener : waiting) listener->OnRoom();
+}
+
+void MapKeeper::GiveUp(const absl::Status& status,
+                       std::vector<StorageItem>& items) {
+  bool first = false;
+  bool fatal = false;
+  {
+    MutexLock lock(mutex_);
+    first = end_.ok();
+    if (first) end_ = status;
+    fatal = first && !absl::IsResourceExhausted(status);
+  }
+  for (const StorageItem& item : items) {
+    if (item.done) item.done(status);
+    if (!first && item.listener != nullptr) item.listener->OnFault();
+  }
+  if (fatal && options_.on_fatal) options_.on_fatal(status);
+}
+
+}  // namespace fathom::server
