@@ -298,8 +298,10 @@ const std::shared_ptr<const Tile>& Tile::ChildAt(std::uint32_t slot) const {
 
 bool Tile::SameSlots(const Tile& other) const {
   // Children are numbered in Z-order, so that equal places have equal bytes.
-  return slot_count_ == other.slot_count_ && whole_ == other.whole_ &&
+  return slot_count_ == other.slot_count_ &&
+         child_count_ == other.child_count_ && whole_ == other.whole_ &&
          divided_ == other.divided_ && has_residuals_ == other.has_residuals_ &&
+         record_bytes_ == other.record_bytes_ && time_s_ == other.time_s_ &&
          std::memcmp(Block(0), other.Block(0), ByteCount()) == 0;
 }
 

@@ -101,6 +101,20 @@ TEST_F(DiffTilesTest, WritingTheSameValueBackIsNoChange) {
   EXPECT_EQ(map_.View().root_tile(), before.root_tile());
 }
 
+TEST_F(DiffTilesTest, ANewTimeAloneIsAChange) {
+  // The middle of both is the same; only the time differs.
+  const auto survey = [&](std::uint32_t time_s) {
+    GlobalMap map({.root = root_});
+    map.MergeArea(root_.Corners(cell_), 10.1, [&](const GeodeticPoint&) {
+      return Measured(10, 0.25f, time_s);
+    });
+    return map.View();
+  };
+  EXPECT_EQ(Diff(survey(100), survey(200)).written,
+            std::vector<TileKey>{below_});
+  EXPECT_TRUE(Diff(survey(100), survey(100)).written.empty());
+}
+
 TEST_F(DiffTilesTest, OldViewsKeepTheirAnswers) {
   Measure(cell_, 10);
   const GlobalMapView before = map_.View();

@@ -119,6 +119,26 @@ TEST(Tile, KeepsResidualsOnlyWhereThereAreAny) {
   EXPECT_EQ(with->LeafAt(101).residual_code, 0);
 }
 
+TEST(Tile, IsTheSameOnlyInEveryField) {
+  const Slots slots = RandomSlots(3, 0.9);
+  const auto tile = slots.Build();
+  EXPECT_TRUE(tile->SameSlots(*slots.Build()));
+  Slots later = slots;
+  for (Leaf& leaf : later.leaves) {
+    if (leaf.known()) leaf.time_s = 8;
+  }
+  EXPECT_FALSE(tile->SameSlots(*later.Build()));
+  Slots deeper = slots;
+  deeper.leaves[0].depth_m += 1;
+  EXPECT_FALSE(tile->SameSlots(*deeper.Build()));
+  Slots less_sure = slots;
+  less_sure.leaves[0].std_code += 1;
+  EXPECT_FALSE(tile->SameSlots(*less_sure.Build()));
+  Slots merged = slots;
+  merged.leaves[0].residual_code = 1;
+  EXPECT_FALSE(tile->SameSlots(*merged.Build()));
+}
+
 TEST(Tile, TotalsHoldWhatLiesBelow) {
   Slots slots{.levels = {1, 1, 1, 1},
               .leaves = {Prior(10), Prior(12), Leaf{}, Prior(11)}};
