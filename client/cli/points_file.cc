@@ -54,6 +54,38 @@ absl::StatusOr<Order> ReadHeader(const std::vector<std::string>& fields) {
   return order;
 }
 
+// Calls `take` with the fields of each line of points and the columns' order.
+template <typename Take>
+absl::Status ForEachLine(std::istream& in, const Take& take) {
+  Order order = {0, 1, 2, 3};
+  std::string line;
+  bool first = true;
+  for (std::uint64_t number = 1; std::getline(in, line); ++number) {
+    const std::vector<std::string> fields = SplitList(line, ',');
+    if ((fields.size() == 1 && fields[0].empty()) || line.starts_with('#')) {
+      continue;
+    }
+    if (std::exchange(first, false) && !ParseNumber(fields[0]).ok()) {
+      FATHOM_ASSIGN_OR_RETURN(order, ReadHeader(fields));
+      continue;
+    }
+    const absl::Status taken = take(fields, order);
+    if (!taken.ok()) {
+      return BadFile(
+          absl::StrFormat("line %d: %s", number, std::string(taken.message())));
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<v1::GeodeticPoint> ReadPlace(
+    const std::vector<std::string>& fields, const Order& order) {
+  if (order[kLatitude] >= fields.size() || order[kLongitude] >= fields.size()) {
+    return absl::InvalidArgumentError("latitude or longitude is missing");
+  }
+  return ParsePoint(fields[order[kLatitude]] + "," + fields[order[kLongitude]]);
+}
+
 absl::StatusOr<QuestionPoint> ReadPoint(const std::vector<std::string>& fields,
                                         const Order& order,
                                         std::optional<double> default_depth_m,
@@ -63,9 +95,8 @@ absl::StatusOr<QuestionPoint> ReadPoint(const std::vector<std::string>& fields,
                                          : std::string();
   };
   QuestionPoint point;
-  FATHOM_ASSIGN_OR_RETURN(
-      const v1::GeodeticPoint position,
-      ParsePoint(field(kLatitude) + "," + field(kLongitude)));
+  FATHOM_ASSIGN_OR_RETURN(const v1::GeodeticPoint position,
+                          ReadPlace(fields, order));
   point.latitude_deg = position.latitude_deg();
   point.longitude_deg = position.longitude_deg();
   if (!field(kDepth).empty()) {
@@ -97,30 +128,19 @@ void AppendAll(const From& from, std::vector<To>& to) {
 absl::StatusOr<std::vector<QuestionPoint>> ReadPoints(
     std::istream& in, std::optional<double> default_depth_m, Time now) {
   std::vector<QuestionPoint> points;
-  Order order = {0, 1, 2, 3};
-  std::string line;
-  bool first = true;
-  for (std::uint64_t number = 1; std::getline(in, line); ++number) {
-    const std::vector<std::string> fields = SplitList(line, ',');
-    if ((fields.size() == 1 && fields[0].empty()) || line.starts_with('#')) {
-      continue;
-    }
-    if (std::exchange(first, false) && !ParseNumber(fields[0]).ok()) {
-      FATHOM_ASSIGN_OR_RETURN(order, ReadHeader(fields));
-      continue;
-    }
-    const absl::StatusOr<QuestionPoint> point =
-        ReadPoint(fields, order, default_depth_m, now);
-    if (!point.ok()) {
-      return BadFile(absl::StrFormat("line %d: %s", number,
-                                     std::string(point.status().message())));
-    }
-    if (points.size() == kMaxPoints) {
-      return BadFile(
-          absl::StrFormat("line %d: more than %d points", number, kMaxPoints));
-    }
-    points.push_back(*point);
-  }
+  FATHOM_RETURN_IF_ERROR(ForEachLine(
+      in,
+      [&](const std::vector<std::string>& fields,
+          const Order& order) -> absl::Status {
+        FATHOM_ASSIGN_OR_RETURN(QuestionPoint point,
+                                ReadPoint(fields, order, default_depth_m, now));
+        if (points.size() == kMaxPoints) {
+          return absl::InvalidArgumentError(
+              absl::StrFormat("more than %d points", kMaxPoints));
+        }
+        points.push_back(point);
+        return absl::OkStatus();
+      }));
   if (points.empty()) return BadFile("no point in it");
   return points;
 }
@@ -140,6 +160,30 @@ absl::StatusOr<std::vector<QuestionPoint>> ReadPoints(
                                    std::string(points.status().message())));
   }
   return points;
+}
+
+absl::StatusOr<std::vector<v1::GeodeticPoint>> ReadPlaces(
+    const std::string& path) {
+  std::ifstream in(path);
+  if (!in) {
+    return FileError(
+        absl::NotFoundError(absl::StrFormat("%s: cannot be opened", path)));
+  }
+  std::vector<v1::GeodeticPoint> places;
+  const absl::Status read =
+      ForEachLine(in,
+                  [&](const std::vector<std::string>& fields,
+                      const Order& order) -> absl::Status {
+                    FATHOM_ASSIGN_OR_RETURN(const v1::GeodeticPoint place,
+                                            ReadPlace(fields, order));
+                    places.push_back(place);
+                    return absl::OkStatus();
+                  });
+  if (!read.ok()) {
+    return BadFile(
+        absl::StrFormat("%s: %s", path, std::string(read.message())));
+  }
+  return places;
 }
 
 absl::StatusOr<PointAnswers> AskPoints(const Client& client,

@@ -49,6 +49,11 @@ absl::StatusOr<std::vector<QuestionPoint>> ReadPoints(
 absl::StatusOr<std::vector<QuestionPoint>> ReadPoints(
     const std::string& path, std::optional<double> default_depth_m, Time now);
 
+// Places alone, such as a vehicle's way: latitude_deg and longitude_deg from
+// the same kind of file; other columns are not looked at.
+absl::StatusOr<std::vector<v1::GeodeticPoint>> ReadPlaces(
+    const std::string& path);
+
 // Asks in parts of at most Limits.max_points_per_query. `common` holds what
 // all share; `time` is for points without their own (absent: now).
 absl::StatusOr<PointAnswers> AskPoints(const Client& client,

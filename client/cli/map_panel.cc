@@ -1,0 +1,413 @@
+#include "client/cli/map_panel.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "absl/strings/str_format.h"
+#include "client/cli/geo_math.h"
+
+namespace fathom::client::cli {
+namespace {
+
+constexpr Color kLand = {0.898, 0.839, 0.714};
+constexpr Color kShore = {0.47, 0.39, 0.25};
+constexpr Color kFrame = {0.13, 0.16, 0.2};
+constexpr Color kTrack = {0.93, 0.36, 0.13};
+constexpr Color kContact = {0.72, 0.07, 0.38};
+constexpr Color kWhite = {1, 1, 1};
+
+// Seconds of motion that a contact's line shows.
+constexpr double kMotionLineS = 60;
+
+// Shores and contours are drawn for grids up to this size; above it a cell is
+// far below a pixel.
+constexpr std::size_t kMaxOutlinedCells = 4'000'000;
+
+bool IsLand(const Region& region, std::size_t index) {
+  return region.kind[index] == v1::EVIDENCE_KIND_LAND;
+}
+
+MetersPerDegree ScaleOf(const Region& region) {
+  return MetersPerDegreeAt(region.north_west.latitude_deg() -
+                           region.latitude_step_deg * region.rows / 2);
+}
+
+std::uint32_t Pixel(const Color& color) {
+  const auto byte = [](double value) {
+    return static_cast<std::uint32_t>(
+        std::lround(255 * std::clamp(value, 0.0, 1.0)));
+  };
+  return 0xff000000u | byte(color.red) << 16 | byte(color.green) << 8 |
+         byte(color.blue);
+}
+
+// The largest of these that fits `span_deg` about `most` times.
+double GraticuleStep(double span_deg, int most) {
+  constexpr std::array<double, 17> kSteps = {
+      30,         20,         10,         5,         2,        1,
+      30. / 60,   20. / 60,   10. / 60,   5. / 60,   2. / 60,  1. / 60,
+      30. / 3600, 20. / 3600, 10. / 3600, 5. / 3600, 1. / 3600};
+  double best = kSteps[0];
+  for (const double step : kSteps) {
+    if (span_deg / step <= most) best = step;
+  }
+  return best;
+}
+
+// "41°30'N"; seconds only where the step needs them.
+std::string AngleText(double degrees, double step_deg, char positive,
+                      char negative) {
+  const auto seconds =
+      static_cast<std::int64_t>(std::llround(std::abs(degrees) * 3600));
+  const char side = degrees < 0 ? negative : positive;
+  if (step_deg >= 1) {
+    return absl::StrFormat("%d°%c", seconds / 3600, side);
+  }
+  if (step_deg >= 1.0 / 60) {
+    return absl::StrFormat("%d°%02d′%c", seconds / 3600, seconds / 60 % 60,
+                           side);
+  }
+  return absl::StrFormat("%d°%02d′%02d″%c", seconds / 3600, seconds / 60 % 60,
+                         seconds % 60, side);
+}
+
+std::string LengthText(double meters) {
+  return meters >= 1000 ? absl::StrFormat("%g km", meters / 1000)
+                        : absl::StrFormat("%g m", meters);
+}
+
+}  // namespace
+
+MapPanel::MapPanel(Canvas& canvas, const Region& region, const Rectangle& frame)
+    : canvas_(canvas), region_(region), frame_(frame) {
+  meters_per_pixel_ = region.longitude_step_deg * region.columns *
+                      ScaleOf(region).longitude / frame.width;
+}
+
+double MapPanel::HeightPerWidth(const Region& region) {
+  const MetersPerDegree scale = ScaleOf(region);
+  return region.latitude_step_deg * region.rows * scale.latitude /
+         (region.longitude_step_deg * region.columns * scale.longitude);
+}
+
+MapPanel::Point MapPanel::ToPixel(const v1::GeodeticPoint& place) const {
+  const double width_deg = region_.longitude_step_deg * region_.columns;
+  const double height_deg = region_.latitude_step_deg * region_.rows;
+  // Counted from the middle, so that the antimeridian needs no thought.
+  const double middle_deg = region_.north_west.longitude_deg() + width_deg / 2;
+  const double east_deg = WrapLongitude(place.longitude_deg() - middle_deg);
+  const double south_deg =
+      region_.north_west.latitude_deg() - place.latitude_deg();
+  return {frame_.x + frame_.width * (0.5 + east_deg / width_deg),
+          frame_.y + frame_.height * south_deg / height_deg};
+}
+
+void MapPanel::ClipToFrame() {
+  cairo_rectangle(canvas_.cairo(), frame_.x, frame_.y, frame_.width,
+                  frame_.height);
+  cairo_clip(canvas_.cairo());
+}
+
+void MapPanel::DrawCells(const CellColor& color_of) {
+  canvas_.Hatch(frame_);
+  const int columns = static_cast<int>(region_.columns);
+  const int rows = static_cast<int>(region_.rows);
+  cairo_surface_t* image =
+      cairo_image_surface_create(CAIRO_FORMAT_ARGB32, columns, rows);
+  cairo_surface_flush(image);
+  auto* bytes = cairo_image_surface_get_data(image);
+  const int stride = cairo_image_surface_get_stride(image);
+  if (bytes == nullptr) {
+    cairo_surface_destroy(image);
+    return;
+  }
+  for (int row = 0; row < rows; ++row) {
+    auto* line = reinterpret_cast<std::uint32_t*>(
+        bytes + static_cast<std::ptrdiff_t>(row) * stride);
+    for (int column = 0; column < columns; ++column) {
+      const std::size_t index = region_.Index(
+          static_cast<std::uint32_t>(row), static_cast<std::uint32_t>(column));
+      Color color;
+      if (IsLand(region_, index)) {
+        line[column] = Pixel(kLand);
+      } else if (color_of(index, &color)) {
+        line[column] = Pixel(color);
+      } else {
+        line[column] = 0;  // Transparent: the hatching stays.
+      }
+    }
+  }
+  cairo_surface_mark_dirty(image);
+  cairo_t* cairo = canvas_.cairo();
+  cairo_save(cairo);
+  ClipToFrame();
+  cairo_translate(cairo, frame_.x, frame_.y);
+  const double pixels_per_cell = frame_.width / columns;
+  cairo_scale(cairo, pixels_per_cell, frame_.height / rows);
+  cairo_set_source_surface(cairo, image, 0, 0);
+  // Cells larger than a pixel show as they are; smaller ones are averaged.
+  cairo_pattern_set_filter(cairo_get_source(cairo), pixels_per_cell >= 1
+                                                        ? CAIRO_FILTER_NEAREST
+                                                        : CAIRO_FILTER_GOOD);
+  cairo_paint(cairo);
+  cairo_restore(cairo);
+  cairo_surface_destroy(image);
+  DrawShore();
+}
+
+void MapPanel::DrawShore() {
+  if (region_.kind.size() > kMaxOutlinedCells) return;
+  cairo_t* cairo = canvas_.cairo();
+  const double cell_x = frame_.width / region_.columns;
+  const double cell_y = frame_.height / region_.rows;
+  for (std::uint32_t row = 0; row < region_.rows; ++row) {
+    for (std::uint32_t column = 0; column < region_.columns; ++column) {
+      const std::size_t index = region_.Index(row, column);
+      const double x = frame_.x + column * cell_x;
+      const double y = frame_.y + row * cell_y;
+      if (column > 0 && IsLand(region_, index) != IsLand(region_, index - 1)) {
+        cairo_move_to(cairo, x, y);
+        cairo_line_to(cairo, x, y + cell_y);
+      }
+      if (row > 0 &&
+          IsLand(region_, index) != IsLand(region_, index - region_.columns)) {
+        cairo_move_to(cairo, x, y);
+        cairo_line_to(cairo, x + cell_x, y);
+      }
+    }
+  }
+  canvas_.SetColor(kShore, 0.9);
+  cairo_set_line_width(cairo, 0.9);
+  cairo_stroke(cairo);
+}
+
+void MapPanel::DrawContours(const std::vector<float>& values,
+                            const std::vector<double>& levels) {
+  if (values.size() > kMaxOutlinedCells) return;
+  cairo_t* cairo = canvas_.cairo();
+  const double cell_x = frame_.width / region_.columns;
+  const double cell_y = frame_.height / region_.rows;
+  cairo_save(cairo);
+  ClipToFrame();
+  for (const double level : levels) {
+    for (std::uint32_t row = 0; row + 1 < region_.rows; ++row) {
+      for (std::uint32_t column = 0; column + 1 < region_.columns; ++column) {
+        // Marching squares between four cell middles: the edges that the
+        // level crosses, in order around the square.
+        const std::array<std::pair<int, int>, 4> kCorner = {
+            {{0, 0}, {0, 1}, {1, 1}, {1, 0}}};
+        std::array<double, 4> v;
+        bool known = true;
+        for (std::size_t k = 0; k < 4; ++k) {
+          const auto [down, right] = kCorner[k];
+          const float value =
+              values[region_.Index(row + static_cast<std::uint32_t>(down),
+                                   column + static_cast<std::uint32_t>(right))];
+          known = known && std::isfinite(value);
+          v[k] = value - level;
+        }
+        if (!known) continue;
+        std::array<Point, 4> crossing;
+        std::size_t crossings = 0;
+        for (std::size_t k = 0; k < 4; ++k) {
+          const std::size_t next = (k + 1) % 4;
+          if ((v[k] < 0) == (v[next] < 0)) continue;
+          const double t = v[k] / (v[k] - v[next]);
+          const double right = kCorner[k].second +
+                               t * (kCorner[next].second - kCorner[k].second);
+          const double down =
+              kCorner[k].first + t * (kCorner[next].first - kCorner[k].first);
+          crossing[crossings++] = {frame_.x + (column + 0.5 + right) * cell_x,
+                                   frame_.y + (row + 0.5 + down) * cell_y};
+        }
+        for (std::size_t k = 0; k + 1 < crossings; k += 2) {
+          cairo_move_to(cairo, crossing[k].x, crossing[k].y);
+          cairo_line_to(cairo, crossing[k + 1].x, crossing[k + 1].y);
+        }
+      }
+    }
+  }
+  canvas_.SetColor({0.05, 0.1, 0.25}, 0.35);
+  cairo_set_line_width(cairo, 0.8);
+  cairo_stroke(cairo);
+  cairo_restore(cairo);
+}
+
+void MapPanel::DrawGraticule() {
+  cairo_t* cairo = canvas_.cairo();
+  const double width_deg = region_.longitude_step_deg * region_.columns;
+  const double height_deg = region_.latitude_step_deg * region_.rows;
+  const double north = region_.north_west.latitude_deg();
+  const double west = region_.north_west.longitude_deg();
+  const TextStyle small{.size = 12, .color = {0.3, 0.33, 0.37}};
+
+  const double column_step = GraticuleStep(width_deg, 6);
+  for (double i = std::ceil(west / column_step - 1e-9);
+       i * column_step <= west + width_deg + 1e-9; ++i) {
+    const double x =
+        frame_.x + frame_.width * (i * column_step - west) / width_deg;
+    canvas_.SetColor(kFrame, 0.13);
+    canvas_.Line(x, frame_.y, x, frame_.y + frame_.height, 0.8);
+    canvas_.SetColor(kFrame);
+    canvas_.Line(x, frame_.y + frame_.height, x, frame_.y + frame_.height + 5,
+                 1);
+    TextStyle style = small;
+    style.align = Align::kCenter;
+    canvas_.Text(
+        AngleText(WrapLongitude(i * column_step), column_step, 'E', 'W'), x,
+        frame_.y + frame_.height + 20, style);
+  }
+  const double row_step = GraticuleStep(height_deg, 6);
+  for (double i = std::ceil((north - height_deg) / row_step - 1e-9);
+       i * row_step <= north + 1e-9; ++i) {
+    const double y =
+        frame_.y + frame_.height * (north - i * row_step) / height_deg;
+    canvas_.SetColor(kFrame, 0.13);
+    canvas_.Line(frame_.x, y, frame_.x + frame_.width, y, 0.8);
+    canvas_.SetColor(kFrame);
+    canvas_.Line(frame_.x - 5, y, frame_.x, y, 1);
+    // Along the side, so that the margin stays narrow.
+    const std::string text = AngleText(i * row_step, row_step, 'N', 'S');
+    cairo_save(cairo);
+    cairo_translate(cairo, frame_.x - 9, y);
+    cairo_rotate(cairo, -std::numbers::pi / 2);
+    TextStyle style = small;
+    style.align = Align::kCenter;
+    canvas_.Text(text, 0, 0, style);
+    cairo_restore(cairo);
+  }
+  canvas_.SetColor(kFrame);
+  canvas_.Stroke(frame_, 1.4);
+}
+
+void MapPanel::DrawTrack(const std::vector<v1::GeodeticPoint>& track) {
+  if (track.empty()) return;
+  cairo_t* cairo = canvas_.cairo();
+  cairo_save(cairo);
+  ClipToFrame();
+  cairo_set_line_join(cairo, CAIRO_LINE_JOIN_ROUND);
+  for (const bool halo : {true, false}) {
+    for (std::size_t i = 0; i < track.size(); ++i) {
+      const Point p = ToPixel(track[i]);
+      if (i == 0) {
+        cairo_move_to(cairo, p.x, p.y);
+      } else {
+        cairo_line_to(cairo, p.x, p.y);
+      }
+    }
+    canvas_.SetColor(halo ? kWhite : kTrack, halo ? 0.75 : 1);
+    cairo_set_line_width(cairo, halo ? 3.6 : 1.6);
+    cairo_stroke(cairo);
+  }
+  const Point start = ToPixel(track.front());
+  const Point end = ToPixel(track.back());
+  for (const auto& [p, filled] :
+       {std::pair{start, false}, std::pair{end, true}}) {
+    cairo_arc(cairo, p.x, p.y, 5, 0, 2 * std::numbers::pi);
+    canvas_.SetColor(filled ? kTrack : kWhite);
+    cairo_fill_preserve(cairo);
+    canvas_.SetColor(filled ? kWhite : kTrack);
+    cairo_set_line_width(cairo, 2);
+    cairo_stroke(cairo);
+  }
+  cairo_restore(cairo);
+}
+
+void MapPanel::DrawContacts(const std::vector<v1::ContactEstimate>& contacts) {
+  cairo_t* cairo = canvas_.cairo();
+  cairo_save(cairo);
+  ClipToFrame();
+  for (const v1::ContactEstimate& contact : contacts) {
+    const Point p = ToPixel(contact.position());
+    if (contact.covariance_size() == 10) {
+      // Half axes are the roots of the eigenvalues of [nn ne; ne ee].
+      const double nn = contact.covariance(0);
+      const double ne = contact.covariance(1);
+      const double ee = contact.covariance(4);
+      const double middle = (nn + ee) / 2;
+      const double spread = std::hypot((nn - ee) / 2, ne);
+      const double major_m = std::sqrt(std::max(0.0, middle + spread));
+      const double minor_m = std::sqrt(std::max(0.0, middle - spread));
+      // Angle of the major axis from north towards east.
+      const double angle = 0.5 * std::atan2(2 * ne, nn - ee);
+      for (const double sigmas : {2.0, 1.0}) {
+        cairo_save(cairo);
+        cairo_translate(cairo, p.x, p.y);
+        cairo_rotate(cairo, angle);
+        // Major axis up the page (north); never thinner than a pixel.
+        cairo_scale(cairo, std::max(0.5, sigmas * minor_m / meters_per_pixel_),
+                    std::max(0.5, sigmas * major_m / meters_per_pixel_));
+        cairo_arc(cairo, 0, 0, 1, 0, 2 * std::numbers::pi);
+        cairo_restore(cairo);
+        canvas_.SetColor(kContact, 0.14);
+        cairo_fill_preserve(cairo);
+        canvas_.SetColor(kContact, sigmas == 1 ? 1 : 0.7);
+        cairo_set_line_width(cairo, sigmas == 1 ? 1.4 : 1);
+        cairo_stroke(cairo);
+      }
+    }
+    const double east_px =
+        contact.velocity_east_m_s() * kMotionLineS / meters_per_pixel_;
+    const double north_px =
+        contact.velocity_north_m_s() * kMotionLineS / meters_per_pixel_;
+    canvas_.SetColor(kContact);
+    canvas_.Line(p.x, p.y, p.x + east_px, p.y - north_px, 1.8);
+    cairo_arc(cairo, p.x, p.y, 3.6, 0, 2 * std::numbers::pi);
+    cairo_fill_preserve(cairo);
+    canvas_.SetColor(kWhite);
+    cairo_set_line_width(cairo, 1);
+    cairo_stroke(cairo);
+    canvas_.Text(contact.contact_id(), p.x + 8, p.y - 7,
+                 {.size = 13, .color = kContact, .bold = true, .halo = 2});
+  }
+  cairo_restore(cairo);
+}
+
+void MapPanel::DrawScaleBar() {
+  const double length_m = RoundStep(0.28 * frame_.width * meters_per_pixel_);
+  const double length_px = length_m / meters_per_pixel_;
+  const Rectangle box{frame_.x + 14, frame_.y + frame_.height - 52,
+                      length_px + 40, 38};
+  canvas_.SetColor(kWhite, 0.82);
+  canvas_.Fill(box);
+  const double x = box.x + 20;
+  const double y = box.y + 12;
+  constexpr int kParts = 4;
+  for (int part = 0; part < kParts; ++part) {
+    canvas_.SetColor(part % 2 == 0 ? kFrame : kWhite);
+    canvas_.Fill({x + part * length_px / kParts, y, length_px / kParts, 5});
+  }
+  canvas_.SetColor(kFrame);
+  canvas_.Stroke({x, y, length_px, 5}, 1);
+  const TextStyle style{.size = 11.5, .align = Align::kCenter};
+  canvas_.Text("0", x, y + 19, style);
+  canvas_.Text(LengthText(length_m), x + length_px, y + 19,
+               {.size = 11.5, .align = Align::kCenter});
+}
+
+void MapPanel::DrawNorthArrow() {
+  cairo_t* cairo = canvas_.cairo();
+  const double x = frame_.x + frame_.width - 32;
+  const double y = frame_.y + 22;
+  canvas_.SetColor(kWhite, 0.82);
+  cairo_arc(cairo, x, y + 16, 25, 0, 2 * std::numbers::pi);
+  cairo_fill(cairo);
+  for (const double side : {-1.0, 1.0}) {
+    cairo_move_to(cairo, x, y + 6);
+    cairo_line_to(cairo, x + side * 8, y + 34);
+    cairo_line_to(cairo, x, y + 28);
+    cairo_close_path(cairo);
+    canvas_.SetColor(side < 0 ? kFrame : kWhite);
+    cairo_fill_preserve(cairo);
+    canvas_.SetColor(kFrame);
+    cairo_set_line_width(cairo, 1);
+    cairo_stroke(cairo);
+  }
+  canvas_.Text("N", x, y + 4,
+               {.size = 13, .bold = true, .align = Align::kCenter});
+}
+
+}  // namespace fathom::client::cli

@@ -1,0 +1,61 @@
+// One map on a canvas: a frame that knows where each place lies, and what is
+// drawn in it. Thread safety: as its canvas.
+
+#ifndef FATHOM_CLIENT_CLI_MAP_PANEL_H_
+#define FATHOM_CLIENT_CLI_MAP_PANEL_H_
+
+#include <functional>
+#include <vector>
+
+#include "client/cli/canvas.h"
+#include "client/cli/value_scale.h"
+#include "client/region.h"
+#include "fathom/v1/types.pb.h"
+
+namespace fathom::client::cli {
+
+class MapPanel {
+ public:
+  // Draws `region` into `frame` of `canvas`; both must outlive this. The
+  // frame must have the region's shape (HeightPerWidth).
+  MapPanel(Canvas& canvas, const Region& region, const Rectangle& frame);
+
+  // Height of a frame that shows the region's true shape, per its width.
+  static double HeightPerWidth(const Region& region);
+
+  // Colour of a cell that is neither land nor unknown, by index; false: treat
+  // it as unknown.
+  using CellColor = std::function<bool(std::size_t index, Color* color)>;
+
+  // Hatching, then all known cells, then land and its shore.
+  void DrawCells(const CellColor& color_of);
+  // Depth contours at the scale's ticks.
+  void DrawContours(const std::vector<float>& values,
+                    const std::vector<double>& levels);
+  // The frame with marks of latitude and longitude.
+  void DrawGraticule();
+  void DrawTrack(const std::vector<v1::GeodeticPoint>& track);
+  void DrawContacts(const std::vector<v1::ContactEstimate>& contacts);
+  void DrawScaleBar();
+  void DrawNorthArrow();
+
+  double meters_per_pixel() const { return meters_per_pixel_; }
+
+ private:
+  struct Point {
+    double x = 0;
+    double y = 0;
+  };
+  Point ToPixel(const v1::GeodeticPoint& place) const;
+  void ClipToFrame();
+  void DrawShore();
+
+  Canvas& canvas_;
+  const Region& region_;
+  const Rectangle frame_;
+  double meters_per_pixel_ = 0;
+};
+
+}  // namespace fathom::client::cli
+
+#endif  // FATHOM_CLIENT_CLI_MAP_PANEL_H_

@@ -1,0 +1,43 @@
+// The map as a picture: depth (with relief, contours, track and contacts) and
+// std side by side, each with its scale, on one PNG.
+//
+// Land is tan, what nobody knows is hatched grey, so that neither is taken for
+// water. The projection is equirectangular with true lengths at the area's
+// middle latitude: shapes are right for areas up to some degrees, and the
+// scale bar holds at the middle. Thread-safe.
+
+#ifndef FATHOM_CLIENT_CLI_PICTURE_H_
+#define FATHOM_CLIENT_CLI_PICTURE_H_
+
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "client/region.h"
+#include "fathom/v1/types.pb.h"
+
+namespace fathom::client::cli {
+
+struct PictureInput {
+  Region region;
+  std::string title;
+  // One line below it: mission, revision, time.
+  std::string subtitle;
+  // Name of the vertical datum, for the legend.
+  std::string vertical_datum;
+  // Where the vehicle went, in order.
+  std::vector<v1::GeodeticPoint> track;
+  // Drawn with 1- and 2-sigma ellipses (39 % and 86 % of the probability in
+  // two dimensions) and a line of one minute's way.
+  std::vector<v1::ContactEstimate> contacts;
+  // Width of the picture, pixels, in [600, 8000]; the height follows.
+  int width_px = 1800;
+};
+
+// Writes the picture. Errors: INVALID_ARGUMENT (width, an area too slender to
+// draw, a file that cannot be written).
+absl::Status DrawPicture(const PictureInput& input, const std::string& path);
+
+}  // namespace fathom::client::cli
+
+#endif  // FATHOM_CLIENT_CLI_PICTURE_H_
