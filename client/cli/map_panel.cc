@@ -270,6 +270,8 @@ void MapPanel::DrawGraticule() {
     canvas_.SetColor(kFrame);
     canvas_.Line(frame_.x - 5, y, frame_.x, y, 1);
     // Along the side, so that the margin stays narrow.
+    // The corners belong to the longitudes.
+    if (y > frame_.y + frame_.height - 24 || y < frame_.y + 24) continue;
     const std::string text = AngleText(i * row_step, row_step, 'N', 'S');
     cairo_save(cairo);
     cairo_translate(cairo, frame_.x - 9, y);
@@ -322,6 +324,11 @@ void MapPanel::DrawContacts(const std::vector<v1::ContactEstimate>& contacts) {
   ClipToFrame();
   for (const v1::ContactEstimate& contact : contacts) {
     const Point p = ToPixel(contact.position());
+    if (p.x < frame_.x || p.x > frame_.x + frame_.width || p.y < frame_.y ||
+        p.y > frame_.y + frame_.height) {
+      DrawContactOutside(contact, p);
+      continue;
+    }
     if (contact.covariance_size() == 10) {
       // Half axes are the roots of the eigenvalues of [nn ne; ne ee].
       const double nn = contact.covariance(0);
@@ -366,14 +373,57 @@ void MapPanel::DrawContacts(const std::vector<v1::ContactEstimate>& contacts) {
   cairo_restore(cairo);
 }
 
+void MapPanel::DrawContactOutside(const v1::ContactEstimate& contact,
+                                  const Point& p) {
+  cairo_t* cairo = canvas_.cairo();
+  const Point middle{frame_.x + frame_.width / 2, frame_.y + frame_.height / 2};
+  const double dx = p.x - middle.x;
+  const double dy = p.y - middle.y;
+  // Where the line from the middle meets the frame, a little inside.
+  constexpr double kInset = 9;
+  const double reach =
+      std::min((frame_.width / 2 - kInset) / std::max(1e-9, std::abs(dx)),
+               (frame_.height / 2 - kInset) / std::max(1e-9, std::abs(dy)));
+  const Point at{middle.x + reach * dx, middle.y + reach * dy};
+  cairo_save(cairo);
+  cairo_translate(cairo, at.x, at.y);
+  cairo_rotate(cairo, std::atan2(dy, dx));
+  cairo_move_to(cairo, 8, 0);
+  cairo_line_to(cairo, -8, -5);
+  cairo_line_to(cairo, -8, 5);
+  cairo_close_path(cairo);
+  cairo_restore(cairo);
+  canvas_.SetColor(kContact);
+  cairo_fill_preserve(cairo);
+  canvas_.SetColor(kWhite);
+  cairo_set_line_width(cairo, 1);
+  cairo_stroke(cairo);
+  const double away_m =
+      (std::hypot(dx, dy) - std::hypot(at.x - middle.x, at.y - middle.y)) *
+      meters_per_pixel_;
+  const bool right = dx > 0;
+  canvas_.Text(
+      absl::StrFormat("%s, %s", contact.contact_id(),
+                      away_m >= 1000 ? absl::StrFormat("%.1f km", away_m / 1000)
+                                     : absl::StrFormat("%.0f m", away_m)),
+      std::clamp(at.x + (right ? -13 : 13), frame_.x + 8,
+                 frame_.x + frame_.width - 8),
+      std::clamp(at.y + 4, frame_.y + 18, frame_.y + frame_.height - 8),
+      {.size = 12,
+       .color = kContact,
+       .bold = true,
+       .align = right ? Align::kRight : Align::kLeft,
+       .halo = 2});
+}
+
 void MapPanel::DrawScaleBar() {
   const double length_m = RoundStep(0.28 * frame_.width * meters_per_pixel_);
   const double length_px = length_m / meters_per_pixel_;
   const Rectangle box{frame_.x + 14, frame_.y + frame_.height - 52,
-                      length_px + 40, 38};
-  canvas_.SetColor(kWhite, 0.82);
+                      length_px + 64, 38};
+  canvas_.SetColor(kWhite, 0.88);
   canvas_.Fill(box);
-  const double x = box.x + 20;
+  const double x = box.x + 26;
   const double y = box.y + 12;
   constexpr int kParts = 4;
   for (int part = 0; part < kParts; ++part) {

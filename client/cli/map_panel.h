@@ -49,6 +49,8 @@ class MapPanel {
   Point ToPixel(const v1::GeodeticPoint& place) const;
   void ClipToFrame();
   void DrawShore();
+  // At the frame, an arrow to a contact that lies outside at `p`.
+  void DrawContactOutside(const v1::ContactEstimate& contact, const Point& p);
 
   Canvas& canvas_;
   const Region& region_;

@@ -85,7 +85,9 @@ void DrawKey(Canvas& canvas, double x, double y, const PictureInput& input) {
     }
     cairo_arc(cairo, x + 13, y, 2.4, 0, 2 * M_PI);
     cairo_fill(cairo);
-    label("contact: 1σ and 2σ ellipses, line = one minute's way");
+    label(
+        "contact: 1σ and 2σ ellipses, line = one minute's way; at the frame: "
+        "outside");
   }
 }
 
@@ -130,8 +132,9 @@ absl::Status DrawPicture(const PictureInput& input, const std::string& path) {
   const std::vector<float> depth_m = WaterOnly(region, region.depth_m);
   const std::vector<float> std_m = WaterOnly(region, region.std_m);
   const ValueScale depth_scale =
-      ValueScale::Covering(depth_m, 0.005, 0.995, false);
-  const ValueScale std_scale = ValueScale::Covering(std_m, 0.01, 0.99, true);
+      ValueScale::Covering(depth_m, 0.005, 0.995, ValueScale::Kind::kRoot);
+  const ValueScale std_scale =
+      ValueScale::Covering(std_m, 0.01, 0.99, ValueScale::Kind::kLogarithmic);
   const Colormap depth_colors = Colormap::Depth();
   const Colormap std_colors = Colormap::Std();
   const MetersPerDegree scale =

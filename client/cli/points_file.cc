@@ -235,11 +235,16 @@ absl::StatusOr<PointAnswers> AskPoints(const Client& client,
     AppendAll(response.kind(), answers.kind);
     if (begin == 0) answers.stamp = response.stamp();
   }
-  // A server may leave reasons out.
+  // A server may leave reasons out; land has no depth.
   answers.mean_depth_m.resize(points.size(), std::nanf(""));
   answers.std_m.resize(points.size(), std::nanf(""));
   answers.age_s.resize(points.size(), std::nanf(""));
   answers.kind.resize(points.size(), v1::EVIDENCE_KIND_UNSPECIFIED);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (answers.kind[i] != v1::EVIDENCE_KIND_LAND) continue;
+    answers.mean_depth_m[i] = std::nanf("");
+    answers.std_m[i] = std::nanf("");
+  }
   return answers;
 }
 

@@ -43,7 +43,9 @@ struct RenderFlags {
 
 struct View {
   GeoBox box;
-  std::optional<Time> time;
+  std::optional<Time> time = std::nullopt;
+  // Of the activity shown, metres; finer than that shows nothing more.
+  double cell_m = 0;
 };
 
 GeoBox BoxAround(const v1::GeodeticPoint& south_west, double north_m,
@@ -94,6 +96,7 @@ absl::StatusOr<View> ViewOfSurvey(const std::string& path) {
       east_m = area.at("east_extent_m").get<double>();
     }
     view.box = BoxAround(south_west, north_m, east_m);
+    view.cell_m = area.value("cell_size_m", 0.0);
     if (survey.contains("end_time")) {
       FATHOM_ASSIGN_OR_RETURN(
           view.time, ParseTime(survey.at("end_time").get<std::string>()));
@@ -109,7 +112,7 @@ absl::StatusOr<View> ChooseView(const RenderFlags& flags,
                                 const v1::GetMissionStatusResponse& status) {
   if (!flags.area.empty()) {
     FATHOM_ASSIGN_OR_RETURN(const GeoBox box, ParseBox(flags.area));
-    return View{box, std::nullopt};
+    return View{.box = box};
   }
   if (!flags.center.empty()) {
     FATHOM_ASSIGN_OR_RETURN(const v1::GeodeticPoint center,
@@ -121,18 +124,17 @@ absl::StatusOr<View> ChooseView(const RenderFlags& flags,
         Offset(center, -flags.size_m / 2, -flags.size_m / 2);
     const v1::GeodeticPoint high =
         Offset(center, flags.size_m / 2, flags.size_m / 2);
-    return View{{low.latitude_deg(), low.longitude_deg(), high.latitude_deg(),
-                 high.longitude_deg()},
-                std::nullopt};
+    return View{.box = {low.latitude_deg(), low.longitude_deg(),
+                        high.latitude_deg(), high.longitude_deg()}};
   }
   if (!flags.survey.empty()) return ViewOfSurvey(flags.survey);
   for (const v1::ActivityStatus& activity : status.activities()) {
     if (flags.activity_id.empty() ||
         activity.activity_id() == flags.activity_id) {
       const v1::ActivityParameters& p = activity.parameters();
-      return View{
-          BoxAround(p.south_west(), p.north_extent_m(), p.east_extent_m()),
-          std::nullopt};
+      return View{.box = BoxAround(p.south_west(), p.north_extent_m(),
+                                   p.east_extent_m()),
+                  .cell_m = p.cell_size_m()};
     }
   }
   if (!flags.activity_id.empty()) {
@@ -140,12 +142,12 @@ absl::StatusOr<View> ChooseView(const RenderFlags& flags,
         absl::StrFormat("activity \"%s\": the mission has none of this name",
                         flags.activity_id));
   }
-  return View{MissionBox(status.global_map().south_west(),
-                         status.global_map().north_west()),
-              std::nullopt};
+  return View{.box = MissionBox(status.global_map().south_west(),
+                                status.global_map().north_west())};
 }
 
-v1::GetRegionRequest RegionRequest(const GeoBox& box, double resolution_m) {
+v1::GetRegionRequest RegionRequest(const View& view, double resolution_m) {
+  const GeoBox& box = view.box;
   v1::GetRegionRequest request;
   request.mutable_south_west()->set_latitude_deg(box.south_deg);
   request.mutable_south_west()->set_longitude_deg(box.west_deg);
@@ -157,10 +159,29 @@ v1::GetRegionRequest RegionRequest(const GeoBox& box, double resolution_m) {
     const double side_m =
         std::max((box.north_deg - box.south_deg) * scale.latitude,
                  box.Width() * scale.longitude);
-    resolution_m = std::max(0.1, side_m / kDefaultCells);
+    resolution_m = std::max({0.1, view.cell_m, side_m / kDefaultCells});
   }
   request.set_resolution_m(resolution_m);
   return request;
+}
+
+std::string Subtitle(const PictureInput& picture, double resolution_m,
+                     Time contacts_time) {
+  std::string text = absl::StrFormat(
+      "%d × %d cells of %s   ·   map revision %s", picture.region.columns,
+      picture.region.rows,
+      resolution_m >= 1000 ? absl::StrFormat("%.3g km", resolution_m / 1000)
+                           : absl::StrFormat("%.3g m", resolution_m),
+      CountText(picture.region.stamp.map_revision()));
+  if (picture.region.stamp.as_of().seconds() != 0) {
+    absl::StrAppendFormat(&text, ", evidence to %s",
+                          TimeText(picture.region.stamp.as_of()));
+  }
+  if (!picture.contacts.empty()) {
+    absl::StrAppendFormat(&text, "   ·   %d contacts at %s",
+                          picture.contacts.size(), FormatTime(contacts_time));
+  }
+  return text;
 }
 
 absl::Status Run(const Session& session, const RenderFlags& flags) {
@@ -176,8 +197,7 @@ absl::Status Run(const Session& session, const RenderFlags& flags) {
   if (!flags.time.empty()) {
     FATHOM_ASSIGN_OR_RETURN(view.time, ParseMoment(flags.time, session.Now()));
   }
-  const v1::GetRegionRequest request =
-      RegionRequest(view.box, flags.resolution_m);
+  const v1::GetRegionRequest request = RegionRequest(view, flags.resolution_m);
   FATHOM_ASSIGN_OR_RETURN(picture.region, client->GetRegion(request));
   v1::ListContactsRequest contacts_request;
   if (view.time.has_value()) {
@@ -191,13 +211,9 @@ absl::Status Run(const Session& session, const RenderFlags& flags) {
       flags.title.empty() ? "Fathom: " + status.name() : flags.title;
   picture.vertical_datum = status.vertical_datum();
   picture.width_px = flags.width_px;
-  picture.subtitle = absl::StrFormat(
-      "%d × %d cells of %.3g m   ·   map revision %s, evidence to %s   ·   %d "
-      "contacts at %s",
-      picture.region.columns, picture.region.rows, request.resolution_m(),
-      CountText(picture.region.stamp.map_revision()),
-      TimeText(picture.region.stamp.as_of()), contacts.contacts_size(),
-      FormatTime(view.time.value_or(session.Now())));
+  picture.subtitle = Subtitle(picture, request.resolution_m(),
+                              std::chrono::floor<std::chrono::seconds>(
+                                  view.time.value_or(session.Now())));
   if (const absl::Status drawn = DrawPicture(picture, flags.out); !drawn.ok()) {
     return UsageError(drawn);
   }

@@ -9,6 +9,15 @@ namespace fathom::client::cli {
 namespace {
 
 constexpr double kLogarithmicSpan = 30;
+constexpr double kRootHigh = 200;
+constexpr double kRootShallowShare = 1.0 / 30;
+
+// The smallest of 1, 2, 5 times a power of ten that is at least `value` > 0.
+double RoundUp(double value) {
+  const double step = RoundStep(value);
+  if (step >= value * (1 - 1e-9)) return step;
+  return RoundStep(step * 2.6);
+}
 
 }  // namespace
 
@@ -20,17 +29,17 @@ double RoundStep(double value) {
   return power;
 }
 
-ValueScale::ValueScale(double low, double high, bool logarithmic)
-    : low_(low), high_(high), logarithmic_(logarithmic) {}
+ValueScale::ValueScale(double low, double high, Kind kind)
+    : low_(low), high_(high), kind_(kind) {}
 
 ValueScale ValueScale::Covering(const std::vector<float>& values,
                                 double low_quantile, double high_quantile,
-                                bool allow_logarithmic) {
+                                Kind wide) {
   std::vector<float> known;
   for (const float value : values) {
     if (std::isfinite(value)) known.push_back(value);
   }
-  if (known.empty()) return ValueScale(0, 1, false);
+  if (known.empty()) return ValueScale(0, 1, Kind::kLinear);
   const auto quantile = [&known](double q) {
     const auto at =
         static_cast<std::ptrdiff_t>(q * static_cast<double>(known.size() - 1));
@@ -39,39 +48,55 @@ ValueScale ValueScale::Covering(const std::vector<float>& values,
   };
   double low = quantile(low_quantile);
   double high = quantile(high_quantile);
-  if (allow_logarithmic && low > 0 && high / low > kLogarithmicSpan) {
-    return ValueScale(std::pow(10, std::floor(std::log10(low))),
-                      std::pow(10, std::ceil(std::log10(high))), true);
+  if (wide == Kind::kLogarithmic && low > 0 && high / low > kLogarithmicSpan) {
+    return ValueScale(RoundStep(low), RoundUp(high), Kind::kLogarithmic);
   }
-  if (high - low < 1e-3 * std::max(std::abs(high), 1e-2)) {
-    const double half = std::max(0.5 * std::abs(high), 0.05);
-    low -= half;
-    high += half;
+  if (wide == Kind::kRoot && high > kRootHigh && low > -0.02 * high &&
+      quantile(0.1) < kRootShallowShare * high) {
+    const double step = RoundStep(high / 5);
+    return ValueScale(0, std::ceil(high / step - 1e-9) * step, Kind::kRoot);
+  }
+  // Hardly any difference is not blown up to the whole scale.
+  if (high - low < 0.05 * std::max(std::abs(high), 0.2)) {
+    const double middle = (low + high) / 2;
+    const double half = std::max(0.5 * std::abs(middle), 0.05);
+    low = middle - half;
+    high = middle + half;
   }
   const double step = RoundStep((high - low) / 5);
   low = std::floor(low / step + 1e-9) * step;
   high = std::ceil(high / step - 1e-9) * step;
-  return ValueScale(low, high, false);
+  return ValueScale(low, high, Kind::kLinear);
 }
 
 double ValueScale::Place(double value) const {
-  if (logarithmic_) {
-    return std::log(std::max(value, low_ * 1e-6) / low_) /
-           std::log(high_ / low_);
+  const double share = (value - low_) / (high_ - low_);
+  switch (kind_) {
+    case Kind::kLogarithmic:
+      return std::log(std::max(value, low_ * 1e-6) / low_) /
+             std::log(high_ / low_);
+    case Kind::kRoot:
+      return share < 0 ? -std::sqrt(-share) : std::sqrt(share);
+    case Kind::kLinear:
+      break;
   }
-  return (value - low_) / (high_ - low_);
+  return share;
 }
 
 std::vector<double> ValueScale::Ticks(int most) const {
   std::vector<double> ticks;
-  if (logarithmic_) {
-    const bool finer = std::log10(high_ / low_) * 3 <= most;
-    for (double power = low_; power < high_ * 1.001; power *= 10) {
-      for (const double factor : {1.0, 2.0, 5.0}) {
-        if (factor > 1 && !finer) continue;
-        if (power * factor <= high_ * 1.001) ticks.push_back(power * factor);
-      }
+  if (kind_ != Kind::kLinear) {
+    // Round values, each far enough from the one before and from the end.
+    const double spacing = 0.6 / most;
+    if (kind_ == Kind::kRoot) ticks.push_back(low_);
+    const double first = kind_ == Kind::kRoot ? 1e-3 * high_ : low_;
+    for (double value = RoundUp(first); value < high_ * 0.999;
+         value = RoundUp(value * 1.001)) {
+      const bool far =
+          ticks.empty() || Place(value) - Place(ticks.back()) > spacing;
+      if (far && 1 - Place(value) > spacing) ticks.push_back(value);
     }
+    ticks.push_back(high_);
     return ticks;
   }
   double step = RoundStep((high_ - low_) / most);

@@ -14,18 +14,30 @@ double RoundStep(double value);
 
 class ValueScale {
  public:
-  // Spans the values between the given quantiles (NaN is skipped), widened to
-  // round numbers. Logarithmic if `allow_logarithmic`, all values are > 0 and
-  // they span more than a factor of 30.
+  enum class Kind {
+    kLinear,
+    // Equal factors are equally long; low > 0.
+    kLogarithmic,
+    // By the square root of the height above low: shallow water, which matters
+    // most, gets the most room.
+    kRoot,
+  };
+
+  // Linear over the values between the given quantiles (NaN is skipped),
+  // widened to round numbers; or of kind `wide` where they span too much for
+  // that: a factor of 30 for kLogarithmic; for kRoot 200 and more with a tenth
+  // of the values in the lowest thirtieth.
   static ValueScale Covering(const std::vector<float>& values,
                              double low_quantile, double high_quantile,
-                             bool allow_logarithmic);
-  ValueScale(double low, double high, bool logarithmic);
+                             Kind wide);
+  ValueScale(double low, double high, Kind kind);
 
   // 0 at low, 1 at high; outside them beyond.
   double Place(double value) const;
   double low() const { return low_; }
   double high() const { return high_; }
+
+  Kind kind() const { return kind_; }
 
   // Round values from low to high, at most about `most`.
   std::vector<double> Ticks(int most) const;
@@ -35,7 +47,7 @@ class ValueScale {
  private:
   double low_;
   double high_;
-  bool logarithmic_;
+  Kind kind_;
 };
 
 }  // namespace fathom::client::cli
