@@ -19,8 +19,7 @@ namespace {
 // Points in one question: far below every server's limit.
 constexpr std::size_t kBatch = 4'096;
 constexpr std::uint64_t kMaxPoints = 10'000'000;
-// Looks at the contacts through the run, and past its end.
-constexpr int kContactLooks = 20;
+// Estimates before this have not seen the ship move.
 constexpr double kSettlingS = 60.0;
 // Truth is asked inside the area only.
 constexpr double kEvaluationMarginM = 50.0;
@@ -110,9 +109,52 @@ void CountObstacles(const std::vector<Place>& places,
   }
 }
 
-absl::Status AddContacts(const client::Client& client,
-                         const SurveyRecord& survey, double seconds,
-                         ContactScore& score, std::uint64_t& missing) {
+// Adds one estimate, which must be for `seconds` after the survey's start.
+void AddEstimate(const SurveyRecord& survey, const Ship& ship, double seconds,
+                 const v1::ContactEstimate& estimate, ContactScore& score) {
+  const PlanePoint truth = ship.PlaceAt(seconds);
+  const map::NedFrame here(
+      {.latitude_deg = estimate.position().latitude_deg(),
+       .longitude_deg = estimate.position().longitude_deg()});
+  const map::NedPoint away =
+      here.ToNed(map::NedFrame(survey.area.south_west)
+                     .ToGeodetic(truth.north_m, truth.east_m));
+  // Row-major upper triangle: nn ne n.vn n.ve ee ...
+  score.Add(-away.north_m, -away.east_m,
+            {.nn = estimate.covariance(0),
+             .ne = estimate.covariance(1),
+             .ee = estimate.covariance(4)});
+}
+
+// The stored estimates after each report.
+absl::Status AddHistory(const client::Client& client,
+                        const SurveyRecord& survey, const Ship& ship,
+                        ContactEvaluation& result) {
+  v1::GetContactHistoryRequest request;
+  request.set_source_id(survey.source_id);
+  request.set_contact_id(ship.id);
+  *request.mutable_start_time() = client::ToProto(survey.start_time);
+  *request.mutable_end_time() = client::ToProto(survey.end_time);
+  const absl::StatusOr<std::vector<v1::ContactEstimate>> history =
+      client.GetContactHistory(request);
+  if (absl::IsNotFound(history.status())) {
+    ++result.missing;
+    return absl::OkStatus();
+  }
+  FATHOM_RETURN_IF_ERROR(history.status());
+  for (const v1::ContactEstimate& estimate : *history) {
+    const double seconds =
+        ToSeconds(client::FromProto(estimate.time()) - survey.start_time);
+    if (seconds < kSettlingS || estimate.covariance_size() != 10) continue;
+    AddEstimate(survey, ship, seconds, estimate, result.during);
+  }
+  return absl::OkStatus();
+}
+
+// All ships at one moment, as the server predicts them.
+absl::Status AddPrediction(const client::Client& client,
+                           const SurveyRecord& survey, double seconds,
+                           ContactScore& score, std::uint64_t& missing) {
   v1::ListContactsRequest request;
   *request.mutable_time() = client::ToProto(
       survey.start_time + std::chrono::duration_cast<Duration>(
@@ -120,7 +162,6 @@ absl::Status AddContacts(const client::Client& client,
   request.set_include_inactive(true);
   FATHOM_ASSIGN_OR_RETURN(const v1::ListContactsResponse response,
                           client.ListContacts(request));
-  const map::NedFrame area_frame(survey.area.south_west);
   for (const Ship& ship : survey.ships) {
     const auto found =
         std::find_if(response.contacts().begin(), response.contacts().end(),
@@ -132,17 +173,7 @@ absl::Status AddContacts(const client::Client& client,
       ++missing;
       continue;
     }
-    const PlanePoint truth = ship.PlaceAt(seconds);
-    const map::NedFrame here(
-        {.latitude_deg = found->position().latitude_deg(),
-         .longitude_deg = found->position().longitude_deg()});
-    const map::NedPoint away =
-        here.ToNed(area_frame.ToGeodetic(truth.north_m, truth.east_m));
-    // Row-major upper triangle: nn ne n.vn n.ve ee ...
-    score.Add(-away.north_m, -away.east_m,
-              {.nn = found->covariance(0),
-               .ne = found->covariance(1),
-               .ee = found->covariance(4)});
+    AddEstimate(survey, ship, seconds, *found, score);
   }
   return absl::OkStatus();
 }
@@ -187,18 +218,14 @@ absl::StatusOr<ContactEvaluation> EvaluateContacts(const client::Client& client,
                                                    const SurveyRecord& survey) {
   ContactEvaluation result;
   if (survey.ships.empty()) return result;
-  const double duration_s = ToSeconds(survey.end_time - survey.start_time);
-  for (int i = 0; i < kContactLooks; ++i) {
-    const double seconds =
-        kSettlingS + (duration_s - kSettlingS) * i / (kContactLooks - 1);
-    if (seconds < kSettlingS) continue;
-    FATHOM_RETURN_IF_ERROR(
-        AddContacts(client, survey, seconds, result.during, result.missing));
+  for (const Ship& ship : survey.ships) {
+    FATHOM_RETURN_IF_ERROR(AddHistory(client, survey, ship, result));
   }
+  const double duration_s = ToSeconds(survey.end_time - survey.start_time);
   for (const int horizon_s : {0, 60, 300, 600}) {
-    FATHOM_RETURN_IF_ERROR(AddContacts(client, survey, duration_s + horizon_s,
-                                       result.predicted[horizon_s],
-                                       result.missing));
+    FATHOM_RETURN_IF_ERROR(AddPrediction(client, survey, duration_s + horizon_s,
+                                         result.predicted[horizon_s],
+                                         result.missing));
   }
   return result;
 }

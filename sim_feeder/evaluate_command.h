@@ -10,8 +10,9 @@
 // shallower" must come true as often as stated: Brier score and reliability
 // table. Places where a contact adds to the probability are left out of it.
 //
-// Contacts: their estimates through the run, and predicted beyond its end,
-// against the true ways of the ships in the survey record.
+// Contacts: their estimates after each report (GetContactHistory), and
+// predicted beyond the run's end, against the true ways of the ships in the
+// survey record.
 
 #ifndef FATHOM_SIM_FEEDER_EVALUATE_COMMAND_H_
 #define FATHOM_SIM_FEEDER_EVALUATE_COMMAND_H_
@@ -61,11 +62,11 @@ struct DepthEvaluation {
 };
 
 struct ContactEvaluation {
-  // Through the run, from the second minute on.
+  // The stored estimates after each report, from the second minute on.
   ContactScore during;
   // Predicted this many seconds past the end of the run.
   std::map<int, ContactScore> predicted;
-  // Ships that the server had no estimate for when asked.
+  // Questions about a ship that the server had no estimate for.
   std::uint64_t missing = 0;
 };
 

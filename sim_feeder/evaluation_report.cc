@@ -123,7 +123,8 @@ std::string EvaluationTable(const DepthEvaluation& depth,
                             bin.MeanStated(), bin.Frequency());
   }
   text += absl::StrFormat(
-      "contacts: %d looks, rmse_m %.2f, NEES %.2f (2 expected), %.1f %% inside "
+      "contacts: %d estimates, rmse_m %.2f, NEES %.2f (2 expected), %.1f %% "
+      "inside "
       "95 %%, missing %d\n",
       contacts.during.count(), contacts.during.RmseM(),
       contacts.during.MeanNees(), 100.0 * contacts.during.ShareWithin95(),

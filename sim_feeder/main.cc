@@ -178,6 +178,8 @@ void AddVehicleAndSonar(CLI::App& app, Scenario& scenario) {
          "How near the first ship comes to the vehicle");
   number("--bearing-std-deg", scenario.passive_bearing_std_deg,
          "Bearing noise of the passive sonar, 1 sigma");
+  number("--passive-range-m", scenario.passive_range_m,
+         "How far it hears; 0: any distance");
   number("--report-interval-s", scenario.report_interval_s,
          "Between reports on one ship");
   number("--fix-interval-s", scenario.fix_interval_s,

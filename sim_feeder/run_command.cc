@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <limits>
+#include <map>
 #include <memory>
 #include <ostream>
 #include <thread>
@@ -46,6 +48,15 @@ std::string RejectNote(const SinkState& state) {
   return note.empty() ? "  no rejects" : note;
 }
 
+std::map<std::string, std::uint64_t> CountsOf(
+    const client::IngestProgress& progress) {
+  std::map<std::string, std::uint64_t> counts;
+  for (const v1::RejectCount& reject : progress.rejects) {
+    counts[ReasonName(reject.reason())] += reject.count();
+  }
+  return counts;
+}
+
 void AddAcks(const SinkState& state, SurveyRecord& record) {
   record.pings_durable = state.pings.durable_sequence;
   record.reports_durable = state.reports.durable_sequence;
@@ -53,12 +64,8 @@ void AddAcks(const SinkState& state, SurveyRecord& record) {
   record.reconnects = state.pings.reconnects + state.reports.reconnects;
   record.map_revision =
       std::max(state.pings.map_revision, state.reports.map_revision);
-  for (const client::IngestProgress* progress :
-       {&state.pings, &state.reports}) {
-    for (const v1::RejectCount& reject : progress->rejects) {
-      record.rejects[ReasonName(reject.reason())] += reject.count();
-    }
-  }
+  record.rejects = CountsOf(state.pings);
+  record.report_rejects = CountsOf(state.reports);
 }
 
 void WriteTrackLine(const Simulation& simulation, std::ostream& track) {
@@ -125,7 +132,10 @@ void PrintSummary(const SurveyRecord& record) {
       record.seconds > 0.0 ? static_cast<double>(record.pings) / record.seconds
                            : 0.0);
   for (const auto& [reason, count] : record.rejects) {
-    absl::FPrintF(stderr, "rejected: %s %d\n", reason, count);
+    absl::FPrintF(stderr, "measurements rejected: %s %d\n", reason, count);
+  }
+  for (const auto& [reason, count] : record.report_rejects) {
+    absl::FPrintF(stderr, "reports rejected: %s %d\n", reason, count);
   }
 }
 

@@ -40,6 +40,10 @@ struct Scenario {
   double crossing_m = 120.0;
   // Bearing noise of the passive sonar, 1 sigma degrees, in (0, 45].
   double passive_bearing_std_deg = 1.5;
+  // How far it hears, metres; 0: any distance, as in the thesis (3.6.1). On a
+  // long run a ship of constant velocity would else be reported from another
+  // sea.
+  double passive_range_m = 20'000.0;
   // Between two reports on one ship, seconds, > 0.
   double report_interval_s = 10.0;
   // Between two C4I fixes of one ship, seconds; 0: none.

@@ -65,6 +65,7 @@ absl::Status ValidateScenario(const Scenario& scenario) {
         Range{"ping_interval_s", scenario.ping_interval_s, 1e-3, 3'600.0},
         Range{"passive_bearing_std_deg", scenario.passive_bearing_std_deg, 1e-6,
               45.0},
+        Range{"passive_range_m", scenario.passive_range_m, 0.0, 2e7},
         Range{"report_interval_s", scenario.report_interval_s, 1e-2, 1e6},
         Range{"fix_interval_s", scenario.fix_interval_s, 0.0, 1e6},
         Range{"fix_position_std_m", scenario.fix_position_std_m, 0.0, 1e4},
@@ -239,6 +240,11 @@ bool Simulation::FillPing(double seconds) {
 
 bool Simulation::FillRangeBearing(const Ship& ship, double seconds) {
   const PlanePoint place = ship.PlaceAt(seconds);
+  if (scenario_.passive_range_m > 0.0 &&
+      std::hypot(place.north_m - state_.north_m, place.east_m - state_.east_m) >
+          scenario_.passive_range_m) {
+    return false;
+  }
   const PassiveMeasurement measurement = MeasurePassive(
       {.sonar_north_m = state_.north_m,
        .sonar_east_m = state_.east_m,

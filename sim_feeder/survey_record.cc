@@ -98,6 +98,8 @@ absl::StatusOr<SurveyRecord> RecordFrom(const Json& json) {
   record.measurements_accepted = json.at("measurements_accepted");
   record.rejects =
       json.at("rejects").get<std::map<std::string, std::uint64_t>>();
+  record.report_rejects =
+      json.at("report_rejects").get<std::map<std::string, std::uint64_t>>();
   record.reconnects = json.at("reconnects");
   record.map_revision = json.at("map_revision");
   record.seconds = json.at("seconds");
@@ -128,6 +130,7 @@ std::string ToJson(const SurveyRecord& record) {
       {"reports_durable", record.reports_durable},
       {"measurements_accepted", record.measurements_accepted},
       {"rejects", record.rejects},
+      {"report_rejects", record.report_rejects},
       {"reconnects", record.reconnects},
       {"map_revision", record.map_revision},
       {"seconds", record.seconds},

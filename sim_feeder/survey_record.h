@@ -39,11 +39,13 @@ struct SurveyRecord {
   std::uint64_t contact_reports = 0;
   std::uint64_t pings_silent = 0;
   // What the acks said: pings and reports that survive a power cut,
-  // measurements fused, refusals by reason (proto names without prefix).
+  // measurements fused; refused pings and measurements, and refused reports,
+  // by reason (proto names without prefix).
   std::uint64_t pings_durable = 0;
   std::uint64_t reports_durable = 0;
   std::uint64_t measurements_accepted = 0;
   std::map<std::string, std::uint64_t> rejects;
+  std::map<std::string, std::uint64_t> report_rejects;
   std::uint64_t reconnects = 0;
   std::uint64_t map_revision = 0;
   // From the first message sent to the last one durable, seconds.
