@@ -12,16 +12,6 @@
 namespace fathom::client::cli {
 namespace {
 
-constexpr Color kLand = {0.898, 0.839, 0.714};
-constexpr Color kShore = {0.47, 0.39, 0.25};
-constexpr Color kFrame = {0.13, 0.16, 0.2};
-constexpr Color kTrack = {0.93, 0.36, 0.13};
-constexpr Color kContact = {0.72, 0.07, 0.38};
-constexpr Color kWhite = {1, 1, 1};
-
-// Seconds of motion that a contact's line shows.
-constexpr double kMotionLineS = 60;
-
 // Shores and contours are drawn for grids up to this size; above it a cell is
 // far below a pixel.
 constexpr std::size_t kMaxOutlinedCells = 4'000'000;
@@ -132,7 +122,7 @@ void MapPanel::DrawCells(const CellColor& color_of) {
           static_cast<std::uint32_t>(row), static_cast<std::uint32_t>(column));
       Color color;
       if (IsLand(region_, index)) {
-        line[column] = Pixel(kLand);
+        line[column] = Pixel(kLandColor);
       } else if (color_of(index, &color)) {
         line[column] = Pixel(color);
       } else {
@@ -179,7 +169,7 @@ void MapPanel::DrawShore() {
       }
     }
   }
-  canvas_.SetColor(kShore, 0.9);
+  canvas_.SetColor(kShoreColor, 0.9);
   cairo_set_line_width(cairo, 0.9);
   cairo_stroke(cairo);
 }
@@ -249,9 +239,9 @@ void MapPanel::DrawGraticule() {
        i * column_step <= west + width_deg + 1e-9; ++i) {
     const double x =
         frame_.x + frame_.width * (i * column_step - west) / width_deg;
-    canvas_.SetColor(kFrame, 0.13);
+    canvas_.SetColor(kFrameColor, 0.13);
     canvas_.Line(x, frame_.y, x, frame_.y + frame_.height, 0.8);
-    canvas_.SetColor(kFrame);
+    canvas_.SetColor(kFrameColor);
     canvas_.Line(x, frame_.y + frame_.height, x, frame_.y + frame_.height + 5,
                  1);
     TextStyle style = small;
@@ -265,9 +255,9 @@ void MapPanel::DrawGraticule() {
        i * row_step <= north + 1e-9; ++i) {
     const double y =
         frame_.y + frame_.height * (north - i * row_step) / height_deg;
-    canvas_.SetColor(kFrame, 0.13);
+    canvas_.SetColor(kFrameColor, 0.13);
     canvas_.Line(frame_.x, y, frame_.x + frame_.width, y, 0.8);
-    canvas_.SetColor(kFrame);
+    canvas_.SetColor(kFrameColor);
     canvas_.Line(frame_.x - 5, y, frame_.x, y, 1);
     // Along the side, so that the margin stays narrow.
     // The corners belong to the longitudes.
@@ -281,139 +271,8 @@ void MapPanel::DrawGraticule() {
     canvas_.Text(text, 0, 0, style);
     cairo_restore(cairo);
   }
-  canvas_.SetColor(kFrame);
+  canvas_.SetColor(kFrameColor);
   canvas_.Stroke(frame_, 1.4);
-}
-
-void MapPanel::DrawTrack(const std::vector<v1::GeodeticPoint>& track) {
-  if (track.empty()) return;
-  cairo_t* cairo = canvas_.cairo();
-  cairo_save(cairo);
-  ClipToFrame();
-  cairo_set_line_join(cairo, CAIRO_LINE_JOIN_ROUND);
-  for (const bool halo : {true, false}) {
-    for (std::size_t i = 0; i < track.size(); ++i) {
-      const Point p = ToPixel(track[i]);
-      if (i == 0) {
-        cairo_move_to(cairo, p.x, p.y);
-      } else {
-        cairo_line_to(cairo, p.x, p.y);
-      }
-    }
-    canvas_.SetColor(halo ? kWhite : kTrack, halo ? 0.75 : 1);
-    cairo_set_line_width(cairo, halo ? 3.6 : 1.6);
-    cairo_stroke(cairo);
-  }
-  const Point start = ToPixel(track.front());
-  const Point end = ToPixel(track.back());
-  for (const auto& [p, filled] :
-       {std::pair{start, false}, std::pair{end, true}}) {
-    cairo_arc(cairo, p.x, p.y, 5, 0, 2 * std::numbers::pi);
-    canvas_.SetColor(filled ? kTrack : kWhite);
-    cairo_fill_preserve(cairo);
-    canvas_.SetColor(filled ? kWhite : kTrack);
-    cairo_set_line_width(cairo, 2);
-    cairo_stroke(cairo);
-  }
-  cairo_restore(cairo);
-}
-
-void MapPanel::DrawContacts(const std::vector<v1::ContactEstimate>& contacts) {
-  cairo_t* cairo = canvas_.cairo();
-  cairo_save(cairo);
-  ClipToFrame();
-  for (const v1::ContactEstimate& contact : contacts) {
-    const Point p = ToPixel(contact.position());
-    if (p.x < frame_.x || p.x > frame_.x + frame_.width || p.y < frame_.y ||
-        p.y > frame_.y + frame_.height) {
-      DrawContactOutside(contact, p);
-      continue;
-    }
-    if (contact.covariance_size() == 10) {
-      // Half axes are the roots of the eigenvalues of [nn ne; ne ee].
-      const double nn = contact.covariance(0);
-      const double ne = contact.covariance(1);
-      const double ee = contact.covariance(4);
-      const double middle = (nn + ee) / 2;
-      const double spread = std::hypot((nn - ee) / 2, ne);
-      const double major_m = std::sqrt(std::max(0.0, middle + spread));
-      const double minor_m = std::sqrt(std::max(0.0, middle - spread));
-      // Angle of the major axis from north towards east.
-      const double angle = 0.5 * std::atan2(2 * ne, nn - ee);
-      for (const double sigmas : {2.0, 1.0}) {
-        cairo_save(cairo);
-        cairo_translate(cairo, p.x, p.y);
-        cairo_rotate(cairo, angle);
-        // Major axis up the page (north); never thinner than a pixel.
-        cairo_scale(cairo, std::max(0.5, sigmas * minor_m / meters_per_pixel_),
-                    std::max(0.5, sigmas * major_m / meters_per_pixel_));
-        cairo_arc(cairo, 0, 0, 1, 0, 2 * std::numbers::pi);
-        cairo_restore(cairo);
-        canvas_.SetColor(kContact, 0.14);
-        cairo_fill_preserve(cairo);
-        canvas_.SetColor(kContact, sigmas == 1 ? 1 : 0.7);
-        cairo_set_line_width(cairo, sigmas == 1 ? 1.4 : 1);
-        cairo_stroke(cairo);
-      }
-    }
-    const double east_px =
-        contact.velocity_east_m_s() * kMotionLineS / meters_per_pixel_;
-    const double north_px =
-        contact.velocity_north_m_s() * kMotionLineS / meters_per_pixel_;
-    canvas_.SetColor(kContact);
-    canvas_.Line(p.x, p.y, p.x + east_px, p.y - north_px, 1.8);
-    cairo_arc(cairo, p.x, p.y, 3.6, 0, 2 * std::numbers::pi);
-    cairo_fill_preserve(cairo);
-    canvas_.SetColor(kWhite);
-    cairo_set_line_width(cairo, 1);
-    cairo_stroke(cairo);
-    canvas_.Text(contact.contact_id(), p.x + 8, p.y - 7,
-                 {.size = 13, .color = kContact, .bold = true, .halo = 2});
-  }
-  cairo_restore(cairo);
-}
-
-void MapPanel::DrawContactOutside(const v1::ContactEstimate& contact,
-                                  const Point& p) {
-  cairo_t* cairo = canvas_.cairo();
-  const Point middle{frame_.x + frame_.width / 2, frame_.y + frame_.height / 2};
-  const double dx = p.x - middle.x;
-  const double dy = p.y - middle.y;
-  // Where the line from the middle meets the frame, a little inside.
-  constexpr double kInset = 9;
-  const double reach =
-      std::min((frame_.width / 2 - kInset) / std::max(1e-9, std::abs(dx)),
-               (frame_.height / 2 - kInset) / std::max(1e-9, std::abs(dy)));
-  const Point at{middle.x + reach * dx, middle.y + reach * dy};
-  cairo_save(cairo);
-  cairo_translate(cairo, at.x, at.y);
-  cairo_rotate(cairo, std::atan2(dy, dx));
-  cairo_move_to(cairo, 8, 0);
-  cairo_line_to(cairo, -8, -5);
-  cairo_line_to(cairo, -8, 5);
-  cairo_close_path(cairo);
-  cairo_restore(cairo);
-  canvas_.SetColor(kContact);
-  cairo_fill_preserve(cairo);
-  canvas_.SetColor(kWhite);
-  cairo_set_line_width(cairo, 1);
-  cairo_stroke(cairo);
-  const double away_m =
-      (std::hypot(dx, dy) - std::hypot(at.x - middle.x, at.y - middle.y)) *
-      meters_per_pixel_;
-  const bool right = dx > 0;
-  canvas_.Text(
-      absl::StrFormat("%s, %s", contact.contact_id(),
-                      away_m >= 1000 ? absl::StrFormat("%.1f km", away_m / 1000)
-                                     : absl::StrFormat("%.0f m", away_m)),
-      std::clamp(at.x + (right ? -13 : 13), frame_.x + 8,
-                 frame_.x + frame_.width - 8),
-      std::clamp(at.y + 4, frame_.y + 18, frame_.y + frame_.height - 8),
-      {.size = 12,
-       .color = kContact,
-       .bold = true,
-       .align = right ? Align::kRight : Align::kLeft,
-       .halo = 2});
 }
 
 void MapPanel::DrawScaleBar() {
@@ -421,16 +280,16 @@ void MapPanel::DrawScaleBar() {
   const double length_px = length_m / meters_per_pixel_;
   const Rectangle box{frame_.x + 14, frame_.y + frame_.height - 52,
                       length_px + 64, 38};
-  canvas_.SetColor(kWhite, 0.88);
+  canvas_.SetColor(kWhiteColor, 0.88);
   canvas_.Fill(box);
   const double x = box.x + 26;
   const double y = box.y + 12;
   constexpr int kParts = 4;
   for (int part = 0; part < kParts; ++part) {
-    canvas_.SetColor(part % 2 == 0 ? kFrame : kWhite);
+    canvas_.SetColor(part % 2 == 0 ? kFrameColor : kWhiteColor);
     canvas_.Fill({x + part * length_px / kParts, y, length_px / kParts, 5});
   }
-  canvas_.SetColor(kFrame);
+  canvas_.SetColor(kFrameColor);
   canvas_.Stroke({x, y, length_px, 5}, 1);
   const TextStyle style{.size = 11.5, .align = Align::kCenter};
   canvas_.Text("0", x, y + 19, style);
@@ -442,7 +301,7 @@ void MapPanel::DrawNorthArrow() {
   cairo_t* cairo = canvas_.cairo();
   const double x = frame_.x + frame_.width - 32;
   const double y = frame_.y + 22;
-  canvas_.SetColor(kWhite, 0.82);
+  canvas_.SetColor(kWhiteColor, 0.82);
   cairo_arc(cairo, x, y + 16, 25, 0, 2 * std::numbers::pi);
   cairo_fill(cairo);
   for (const double side : {-1.0, 1.0}) {
@@ -450,9 +309,9 @@ void MapPanel::DrawNorthArrow() {
     cairo_line_to(cairo, x + side * 8, y + 34);
     cairo_line_to(cairo, x, y + 28);
     cairo_close_path(cairo);
-    canvas_.SetColor(side < 0 ? kFrame : kWhite);
+    canvas_.SetColor(side < 0 ? kFrameColor : kWhiteColor);
     cairo_fill_preserve(cairo);
-    canvas_.SetColor(kFrame);
+    canvas_.SetColor(kFrameColor);
     cairo_set_line_width(cairo, 1);
     cairo_stroke(cairo);
   }

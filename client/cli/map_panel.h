@@ -14,6 +14,14 @@
 
 namespace fathom::client::cli {
 
+// The colours that mean something, for maps and their keys.
+inline constexpr Color kLandColor = {0.898, 0.839, 0.714};
+inline constexpr Color kShoreColor = {0.47, 0.39, 0.25};
+inline constexpr Color kFrameColor = {0.13, 0.16, 0.2};
+inline constexpr Color kTrackColor = {0.93, 0.36, 0.13};
+inline constexpr Color kContactColor = {0.72, 0.07, 0.38};
+inline constexpr Color kWhiteColor = {1, 1, 1};
+
 class MapPanel {
  public:
   // Draws `region` into `frame` of `canvas`; both must outlive this. The

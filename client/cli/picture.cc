@@ -27,7 +27,6 @@ constexpr double kKeyBlock = 40;
 constexpr double kMinShape = 0.2;
 constexpr double kMaxShape = 1.6;
 
-constexpr Color kInk = {0.13, 0.16, 0.2};
 constexpr Color kGrey = {0.38, 0.41, 0.45};
 
 void DrawColorBar(Canvas& canvas, const Rectangle& bar, const Colormap& colors,
@@ -36,11 +35,11 @@ void DrawColorBar(Canvas& canvas, const Rectangle& bar, const Colormap& colors,
     canvas.SetColor(colors.At(x / bar.width));
     canvas.Fill({bar.x + x, bar.y, std::min(1.5, bar.width - x), bar.height});
   }
-  canvas.SetColor(kInk);
+  canvas.SetColor(kFrameColor);
   canvas.Stroke(bar, 1);
   for (const double tick : scale.Ticks(8)) {
     const double x = bar.x + bar.width * scale.Place(tick);
-    canvas.SetColor(kInk);
+    canvas.SetColor(kFrameColor);
     canvas.Line(x, bar.y + bar.height, x, bar.y + bar.height + 4, 1);
     canvas.Text(ValueScale::TickText(tick), x, bar.y + bar.height + 17,
                 {.size = 12, .align = Align::kCenter});
@@ -56,9 +55,9 @@ void DrawKey(Canvas& canvas, double x, double y, const PictureInput& input) {
     canvas.Text(text, x + 34, y + 4, style);
     x += 34 + canvas.TextWidth(text, style) + 26;
   };
-  canvas.SetColor({0.898, 0.839, 0.714});
+  canvas.SetColor(kLandColor);
   canvas.Fill({x, y - 7, 26, 14});
-  canvas.SetColor({0.47, 0.39, 0.25});
+  canvas.SetColor(kShoreColor);
   canvas.Stroke({x, y - 7, 26, 14}, 1);
   label("land");
   canvas.Hatch({x, y - 7, 26, 14});
@@ -66,14 +65,14 @@ void DrawKey(Canvas& canvas, double x, double y, const PictureInput& input) {
   canvas.Stroke({x, y - 7, 26, 14}, 1);
   label("unknown");
   if (!input.track.empty()) {
-    canvas.SetColor({0.93, 0.36, 0.13});
+    canvas.SetColor(kTrackColor);
     canvas.Line(x, y, x + 26, y, 2.2);
     cairo_arc(cairo, x + 26, y, 4, 0, 2 * M_PI);
     cairo_fill(cairo);
     label("vehicle track");
   }
   if (!input.contacts.empty()) {
-    canvas.SetColor({0.72, 0.07, 0.38});
+    canvas.SetColor(kContactColor);
     for (const double half : {1.0, 0.55}) {
       cairo_save(cairo);
       cairo_translate(cairo, x + 13, y);

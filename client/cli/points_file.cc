@@ -28,6 +28,9 @@ constexpr std::array<std::array<const char*, 3>, kColumns> kNames = {{
     {"time", "time_utc", "timestamp"},
 }};
 
+// Points of one request to a server that states no limit.
+constexpr std::size_t kDefaultPart = 10'000;
+
 constexpr std::size_t kAbsent = static_cast<std::size_t>(-1);
 using Order = std::array<std::size_t, kColumns>;
 
@@ -192,8 +195,9 @@ absl::StatusOr<PointAnswers> AskPoints(const Client& client,
                                        std::optional<Time> time) {
   FATHOM_ASSIGN_OR_RETURN(const v1::GetMissionStatusResponse status,
                           client.GetMissionStatus());
-  const std::size_t part = std::max<std::size_t>(
-      1, static_cast<std::size_t>(status.limits().max_points_per_query()));
+  const auto limit =
+      static_cast<std::size_t>(status.limits().max_points_per_query());
+  const std::size_t part = limit > 0 ? limit : kDefaultPart;
   const bool own_times = std::any_of(
       points.begin(), points.end(),
       [](const QuestionPoint& point) { return point.time.has_value(); });

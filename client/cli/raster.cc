@@ -1,7 +1,6 @@
 #include "client/cli/raster.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstring>
 #include <exception>
@@ -13,6 +12,7 @@
 #include "client/cli/exit_code.h"
 #include "client/cli/gdal_edge.h"
 #include "client/cli/geo_math.h"
+#include "client/cli/raster_band.h"
 #include "client/cli/raster_source.h"
 
 namespace fathom::client::cli {
@@ -22,40 +22,6 @@ constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
 // The sample that the sign is decided from: this many rows and columns.
 constexpr int kSampleSide = 512;
-
-// Values that stand for "nothing" in files that do not declare it.
-constexpr std::array<double, 6> kSentinels = {-9999,   9999,   -32'768,
-                                              -99'999, 99'999, 1'000'000};
-
-bool Contains(std::string text, std::initializer_list<const char*> words) {
-  for (char& c : text) c = static_cast<char>(std::tolower(c));
-  return std::any_of(words.begin(), words.end(), [&](const char* word) {
-    return text.find(word) != std::string::npos;
-  });
-}
-
-// One band with what turns its raw values into metres.
-struct Band {
-  GDALRasterBand* band = nullptr;
-  double scale = 1;
-  double offset = 0;
-  bool declares_nodata = false;
-};
-
-struct Window {
-  int column = 0;
-  int row = 0;
-  int columns = 0;
-  int rows = 0;
-};
-
-double MetersPerUnit(const std::string& unit) {
-  if (Contains(unit, {"fathom"})) return 1.8288;
-  if (unit == "ft" || Contains(unit, {"foot", "feet"})) return 0.3048;
-  if (unit == "cm") return 0.01;
-  if (unit == "km") return 1000;
-  return 1;
-}
 
 class GdalDepthRaster final : public DepthRaster {
  public:
@@ -102,34 +68,20 @@ class GdalDepthRaster final : public DepthRaster {
                                        std::string(status.message()))));
   }
 
-  absl::StatusOr<Band> OpenBand(int number, const char* flag) {
-    if (number < 1 || number > dataset_->GetRasterCount()) {
-      return Named(absl::InvalidArgumentError(
-          absl::StrFormat("%s=%d: it has bands 1 to %d", flag, number,
-                          dataset_->GetRasterCount())));
-    }
-    Band band;
-    band.band = dataset_->GetRasterBand(number);
-    if (GDALDataTypeIsComplex(band.band->GetRasterDataType())) {
-      return Named(absl::InvalidArgumentError(
-          absl::StrFormat("band %d holds complex numbers", number)));
-    }
-    int has = 0;
-    const double scale = band.band->GetScale(&has);
-    if (has && std::isfinite(scale) && scale != 0) band.scale = scale;
-    const double offset = band.band->GetOffset(&has);
-    if (has && std::isfinite(offset)) band.offset = offset;
-    band.band->GetNoDataValue(&has);
-    band.declares_nodata = has || band.band->GetMaskFlags() != GMF_ALL_VALID;
-    const char* unit = band.band->GetUnitType();
-    const double meters = MetersPerUnit(unit == nullptr ? "" : unit);
-    if (meters != 1) {
-      summary_.remarks.push_back(absl::StrFormat(
-          "band %d is in %s: turned into metres", number, unit));
-    }
-    band.scale *= meters;
-    band.offset *= meters;
+  absl::StatusOr<RasterBand> OpenBand(int number, double divisor) {
+    absl::StatusOr<RasterBand> band =
+        RasterBand::Open(*dataset_, number, divisor, summary_.remarks);
+    if (!band.ok()) return Named(band.status());
     return band;
+  }
+
+  absl::StatusOr<BandCells> ReadBand(const RasterBand& band,
+                                     const RasterWindow& window, int columns,
+                                     int rows) const {
+    absl::StatusOr<BandCells> cells =
+        band.Read(window, columns, rows, kMaxPlausibleM);
+    if (!cells.ok()) return Named(cells.status());
+    return cells;
   }
 
   absl::Status ChooseBands() {
@@ -139,28 +91,28 @@ class GdalDepthRaster final : public DepthRaster {
       const std::string description =
           dataset_->GetRasterBand(i)->GetDescription();
       if (depth == 0 &&
-          Contains(description, {"elevation", "depth", "bathy"})) {
+          ContainsWord(description, {"elevation", "depth", "bathy"})) {
         depth = i;
       }
       if (std == 0 && !options_.std_m.has_value() &&
-          Contains(description, {"uncert", "std", "sigma", "standard dev"})) {
+          ContainsWord(description,
+                       {"uncert", "std", "sigma", "standard dev"})) {
         std = i;
       }
     }
     if (depth == 0) depth = 1;
-    FATHOM_ASSIGN_OR_RETURN(depth_, OpenBand(depth, "band"));
-    const std::string description = depth_.band->GetDescription();
+    FATHOM_ASSIGN_OR_RETURN(depth_, OpenBand(depth, 1));
+    const std::string description = depth_.description();
     if (dataset_->GetRasterCount() > 1) {
       summary_.remarks.push_back(
           absl::StrFormat("depths from band %d%s", depth,
                           description.empty() ? "" : " (" + description + ")"));
     }
     if (std != 0) {
-      FATHOM_ASSIGN_OR_RETURN(std_, OpenBand(std, "std band"));
-      const double sigmas = options_.std_is_95_percent ? kSigmasOf95Percent : 1;
-      std_.scale /= sigmas;
-      std_.offset /= sigmas;
-      const std::string name = std_.band->GetDescription();
+      FATHOM_ASSIGN_OR_RETURN(
+          std_,
+          OpenBand(std, options_.std_is_95_percent ? kSigmasOf95Percent : 1));
+      const std::string name = std_.description();
       summary_.std_source = absl::StrFormat(
           "band %d%s, %s", std, name.empty() ? "" : " (" + name + ")",
           options_.std_is_95_percent
@@ -205,11 +157,12 @@ class GdalDepthRaster final : public DepthRaster {
     }
     SignEvidence evidence;
     evidence.driver = summary_.driver;
-    evidence.band_description = depth_.band->GetDescription();
+    evidence.band_description = depth_.description();
     evidence.file_name = options_.path;
     evidence.values = values_;
     evidence.negative_values = negative_values_;
-    for (char** items : {depth_.band->GetMetadata(), dataset_->GetMetadata()}) {
+    for (char** items :
+         {depth_.gdal().GetMetadata(), dataset_->GetMetadata()}) {
       for (int i = 0; items != nullptr && items[i] != nullptr; ++i) {
         const std::string item = items[i];
         const std::size_t equal = item.find('=');
@@ -225,52 +178,12 @@ class GdalDepthRaster final : public DepthRaster {
     return absl::OkStatus();
   }
 
-  absl::Status Sample(const Window& window, int columns, int rows) {
-    std::vector<float> values;
-    FATHOM_RETURN_IF_ERROR(
-        ReadBand(depth_, window, columns, rows, kMaxPlausibleM, values));
-    for (const float value : values) {
+  absl::Status Sample(const RasterWindow& window, int columns, int rows) {
+    FATHOM_ASSIGN_OR_RETURN(const BandCells cells,
+                            ReadBand(depth_, window, columns, rows));
+    for (const float value : cells.values) {
       values_ += std::isfinite(value);
       negative_values_ += value < 0;
-    }
-    return absl::OkStatus();
-  }
-
-  // Reads a window, thinned to columns x rows, in metres; nodata and values
-  // beyond +-max become NaN.
-  absl::Status ReadBand(const Band& band, const Window& w, int columns,
-                        int rows, double max, std::vector<float>& out) {
-    const GdalErrors errors;
-    const std::size_t count =
-        static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
-    std::vector<double> raw(count);
-    std::vector<std::uint8_t> mask;
-    CPLErr result = band.band->RasterIO(GF_Read, w.column, w.row, w.columns,
-                                        w.rows, raw.data(), columns, rows,
-                                        GDT_Float64, 0, 0, nullptr);
-    if (result == CE_None && band.band->GetMaskFlags() != GMF_ALL_VALID) {
-      mask.resize(count);
-      result = band.band->GetMaskBand()->RasterIO(
-          GF_Read, w.column, w.row, w.columns, w.rows, mask.data(), columns,
-          rows, GDT_Byte, 0, 0, nullptr);
-    }
-    if (result != CE_None) {
-      return Named(absl::DataLossError(absl::StrFormat(
-          "damaged or cut off: rows %d to %d cannot be read (%s)", w.row,
-          w.row + w.rows - 1, errors.message())));
-    }
-    out.resize(count);
-    implausible_.assign(count, 0);
-    for (std::size_t i = 0; i < count; ++i) {
-      const double value = raw[i] * band.scale + band.offset;
-      const bool masked = !mask.empty() && mask[i] == 0;
-      const bool sentinel = !band.declares_nodata &&
-                            std::find(kSentinels.begin(), kSentinels.end(),
-                                      raw[i]) != kSentinels.end();
-      const bool absurd = !(std::abs(value) <= max);
-      implausible_[i] =
-          !masked && std::isfinite(raw[i]) && (sentinel || absurd);
-      out[i] = masked || sentinel || absurd ? kNan : static_cast<float>(value);
     }
     return absl::OkStatus();
   }
@@ -298,23 +211,21 @@ class GdalDepthRaster final : public DepthRaster {
       low_y = std::min(low_y, y[i]);
       high_y = std::max(high_y, y[i]);
     }
-    std::vector<float> depths, stds;
-    std::vector<std::uint8_t> implausible;
-    Window window;
+    BandCells depths, stds;
+    RasterWindow window;
     if (high_x >= low_x) {
       window = {static_cast<int>(low_x), static_cast<int>(low_y),
                 static_cast<int>(high_x) - static_cast<int>(low_x) + 1,
                 static_cast<int>(high_y) - static_cast<int>(low_y) + 1};
-      FATHOM_RETURN_IF_ERROR(ReadBand(depth_, window, window.columns,
-                                      window.rows, kMaxPlausibleM, depths));
-      implausible = implausible_;
-      if (std_.band != nullptr) {
-        FATHOM_RETURN_IF_ERROR(ReadBand(std_, window, window.columns,
-                                        window.rows, kMaxPlausibleM, stds));
+      FATHOM_ASSIGN_OR_RETURN(
+          depths, ReadBand(depth_, window, window.columns, window.rows));
+      if (std_) {
+        FATHOM_ASSIGN_OR_RETURN(
+            stds, ReadBand(std_, window, window.columns, window.rows));
       }
     }
     v1::DepthTile tile = EmptyTile(block);
-    if (std_.band == nullptr) {
+    if (!std_) {
       tile.add_std_m(static_cast<float>(*options_.std_m));
     }
     std::string land(cells, '\0');
@@ -329,9 +240,10 @@ class GdalDepthRaster final : public DepthRaster {
             static_cast<std::size_t>(static_cast<int>(y[i]) - window.row) *
                 static_cast<std::size_t>(window.columns) +
             static_cast<std::size_t>(static_cast<int>(x[i]) - window.column);
-        depth = summary_.positive == Positive::kUp ? -depths[at] : depths[at];
-        if (std_.band != nullptr && stds[at] > 0) std = stds[at];
-        counts_.implausible += implausible[at];
+        depth = summary_.positive == Positive::kUp ? -depths.values[at]
+                                                   : depths.values[at];
+        if (std_ && stds.values[at] > 0) std = stds.values[at];
+        counts_.implausible += depths.implausible[at];
       }
       if (-depth > options_.land_above_m) {
         land[i] = 1;
@@ -349,7 +261,7 @@ class GdalDepthRaster final : public DepthRaster {
       }
       // A depth of -0.0 reads badly.
       tile.add_depth_m(depth == 0 ? 0.0f : depth);
-      if (std_.band != nullptr) {
+      if (std_) {
         // The contract wants a number for cells without a depth too.
         tile.add_std_m(std::isfinite(depth) ? std : 1.0f);
       }
@@ -386,14 +298,12 @@ class GdalDepthRaster final : public DepthRaster {
   const RasterOptions options_;
   RasterSummary summary_;
   RasterCounts counts_;
-  Band depth_;
-  Band std_;  // band is null: options_.std_m for all.
+  RasterBand depth_;
+  RasterBand std_;  // None: options_.std_m for all.
   std::unique_ptr<RasterSource> source_;
   LonLatGrid grid_;
   std::uint64_t values_ = 0;
   std::uint64_t negative_values_ = 0;
-  // Of the last ReadBand: had a value that is none.
-  std::vector<std::uint8_t> implausible_;
 };
 
 DatasetPtr OpenDataset(const std::string& path,

@@ -1,0 +1,201 @@
+// Pictures: what stands where, read back from the PNG's pixels.
+
+#include "client/cli/picture.h"
+
+#include <cairo/cairo.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <stdlib.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "client/cli/colormap.h"
+#include "client/cli/map_panel.h"
+#include "client/cli/relief_shading.h"
+#include "tests/testing/status_matchers.h"
+
+namespace fathom::client::cli {
+namespace {
+
+using ::fathom::testing::StatusIs;
+using ::testing::HasSubstr;
+
+// 40 x 40 cells of 0.001 degrees: the west half a slope from 5 to 24 m, then
+// land, and the last ten columns unknown.
+Region MakeRegion() {
+  Region region;
+  region.rows = region.columns = 40;
+  region.north_west.set_latitude_deg(0.02);
+  region.north_west.set_longitude_deg(10);
+  region.latitude_step_deg = region.longitude_step_deg = 0.001;
+  const std::size_t cells = 1600;
+  region.depth_m.assign(cells, std::nanf(""));
+  region.std_m.assign(cells, std::nanf(""));
+  region.age_s.assign(cells, std::nanf(""));
+  region.shoalest_m.assign(cells, std::nanf(""));
+  region.kind.assign(cells, v1::EVIDENCE_KIND_UNSPECIFIED);
+  for (std::uint32_t row = 0; row < 40; ++row) {
+    for (std::uint32_t column = 0; column < 30; ++column) {
+      const std::size_t i = region.Index(row, column);
+      if (column < 20) {
+        region.depth_m[i] = 5 + static_cast<float>(column);
+        region.std_m[i] = 0.5f;
+        region.kind[i] = v1::EVIDENCE_KIND_MEASURED;
+      } else {
+        region.kind[i] = v1::EVIDENCE_KIND_LAND;
+      }
+    }
+  }
+  return region;
+}
+
+class PictureTest : public ::testing::Test {
+ protected:
+  PictureTest() {
+    folder_ =
+        std::filesystem::temp_directory_path() / "fathom_picture_test.XXXXXX";
+    mkdtemp(folder_.data());
+  }
+  ~PictureTest() override {
+    cairo_surface_destroy(image_);
+    std::filesystem::remove_all(folder_);
+  }
+
+  void Draw(const PictureInput& input) {
+    const std::string path = folder_ + "/map.png";
+    FATHOM_ASSERT_OK(DrawPicture(input, path));
+    cairo_surface_destroy(image_);
+    image_ = cairo_image_surface_create_from_png(path.c_str());
+    ASSERT_EQ(cairo_surface_status(image_), CAIRO_STATUS_SUCCESS);
+  }
+
+  // 0xRRGGBB at a place.
+  std::uint32_t At(double x, double y) const {
+    const unsigned char* data = cairo_image_surface_get_data(image_);
+    const auto* line = reinterpret_cast<const std::uint32_t*>(
+        data + static_cast<int>(y) * cairo_image_surface_get_stride(image_));
+    return line[static_cast<int>(x)] & 0xffffff;
+  }
+
+  std::string folder_;
+  cairo_surface_t* image_ = nullptr;
+};
+
+// Panels of an 1800 pixel picture: left from x = 60, 823 wide, y from 92;
+// margins 34, labels 26 and gap 34 (picture.cc).
+constexpr double kLeft = 60;
+constexpr double kWidth = (1800.0 - 2 * 34 - 34 - 2 * 26) / 2;
+constexpr double kTop = 92;
+
+TEST_F(PictureTest, LandIsTanUnknownIsGreyAndDeeperIsDarker) {
+  PictureInput input;
+  input.region = MakeRegion();
+  Draw(input);
+  ASSERT_NE(image_, nullptr);
+  EXPECT_EQ(cairo_image_surface_get_width(image_), 1800);
+  const double y = kTop + 0.31 * kWidth;
+  const auto column_x = [](double column) {
+    return kLeft + (column + 0.4) / 40 * kWidth;
+  };
+  // 0.898, 0.839, 0.714 of 255: e5, d6, b6.
+  EXPECT_EQ(At(column_x(25), y), 0xe5d6b6u);
+  // Grey: red, green and blue within 3 of each other.
+  const std::uint32_t unknown = At(column_x(35), y);
+  EXPECT_NEAR(static_cast<double>(unknown >> 16 & 0xff),
+              static_cast<double>(unknown & 0xff), 5);
+  const auto brightness = [&](double column) {
+    const std::uint32_t rgb = At(column_x(column), y);
+    return (rgb >> 16 & 0xff) + (rgb >> 8 & 0xff) + (rgb & 0xff);
+  };
+  EXPECT_GT(brightness(2), brightness(10));
+  EXPECT_GT(brightness(10), brightness(18));
+}
+
+TEST_F(PictureTest, ContactStandsAtItsPlaceWithItsEllipse) {
+  PictureInput input;
+  input.region = MakeRegion();
+  v1::ContactEstimate contact;
+  contact.set_contact_id("c");
+  // The middle of the region.
+  contact.mutable_position()->set_latitude_deg(0);
+  contact.mutable_position()->set_longitude_deg(10.02);
+  // 1 sigma: 200 m north, 400 m east. 40 cells of 0.001 degrees are 4453 m
+  // wide, so 2 sigma east are 800 m = 0.18 of the panel.
+  for (const double c : {40'000., 0., 0., 0., 160'000., 0., 0., 1., 0., 1.}) {
+    contact.add_covariance(c);
+  }
+  PictureInput without = input;
+  input.contacts.push_back(contact);
+  const double x = kLeft + kWidth / 2;
+  const double y = kTop + kWidth * MapPanel::HeightPerWidth(input.region) / 2;
+  Draw(without);
+  const std::uint32_t inside_before = At(x - 0.17 * kWidth, y + 3);
+  const std::uint32_t outside_before = At(x - 0.19 * kWidth, y + 3);
+  const std::uint32_t north_before = At(x - 6, y - 0.12 * kWidth);
+  Draw(input);
+  EXPECT_EQ(At(x, y), 0xb81161u);  // 0.72, 0.07, 0.38 of 255, cut off.
+  EXPECT_NE(At(x - 0.17 * kWidth, y + 3), inside_before);
+  EXPECT_EQ(At(x - 0.19 * kWidth, y + 3), outside_before);
+  // 2 sigma north are 400 m = 0.09 of the panel.
+  EXPECT_EQ(At(x - 6, y - 0.12 * kWidth), north_before);
+}
+
+TEST_F(PictureTest, WrongSizesAndPlacesAreRefused) {
+  PictureInput input;
+  input.region = MakeRegion();
+  input.width_px = 599;
+  EXPECT_THAT(
+      DrawPicture(input, folder_ + "/x.png"),
+      StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("width_px=599")));
+  input.width_px = 600;
+  EXPECT_THAT(DrawPicture(input, folder_ + "/no/such/folder.png"),
+              StatusIs(absl::StatusCode::kInvalidArgument,
+                       HasSubstr("cannot be written")));
+  input.region.latitude_step_deg = 0.01;  // Ten times as high as wide.
+  EXPECT_THAT(
+      DrawPicture(input, folder_ + "/x.png"),
+      StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("as high")));
+}
+
+TEST(Colormap, LightnessFallsEvenly) {
+  for (const Colormap& map : {Colormap::Depth(), Colormap::Std()}) {
+    const double step =
+        ToOkLab(map.At(0)).lightness - ToOkLab(map.At(0.25)).lightness;
+    EXPECT_GT(step, 0.1);
+    for (const double t : {0.25, 0.5, 0.75}) {
+      // Clamping to the gamut may cost a little.
+      EXPECT_NEAR(
+          ToOkLab(map.At(t)).lightness - ToOkLab(map.At(t + 0.25)).lightness,
+          step, 0.02);
+    }
+  }
+}
+
+TEST(Colormap, OkLabOfWhiteAndBack) {
+  EXPECT_NEAR(ToOkLab({1, 1, 1}).lightness, 1, 1e-6);
+  const Color color = FromOkLab(ToOkLab({0.2, 0.5, 0.8}));
+  EXPECT_NEAR(color.red, 0.2, 1e-6);
+  EXPECT_NEAR(color.green, 0.5, 1e-6);
+  EXPECT_NEAR(color.blue, 0.8, 1e-6);
+}
+
+TEST(ShadeRelief, SlopesTowardsTheLightAreBrighter) {
+  // A roof whose ridge runs north to south in column 4: its west side faces
+  // the light, its east side lies in the shade.
+  const ShadingGrid grid{
+      .rows = 5, .columns = 9, .north_south_m = 10, .east_west_m = 10};
+  std::vector<float> depth;
+  for (int i = 0; i < 45; ++i) {
+    depth.push_back(10 + static_cast<float>(std::abs(i % 9 - 4)));
+  }
+  const std::vector<float> shade = ShadeRelief(depth, grid);
+  EXPECT_GT(shade[2 * 9 + 2], 1.02f);
+  EXPECT_LT(shade[2 * 9 + 6], 0.95f);
+  // Flat: no shade at all.
+  const std::vector<float> flat = ShadeRelief(std::vector<float>(45, 7), grid);
+  EXPECT_NEAR(flat[2 * 9 + 2], 1, 1e-6);
+}
+
+}  // namespace
+}  // namespace fathom::client::cli
