@@ -33,8 +33,9 @@ class CliTest : public ::testing::Test {
   }
   static Outcome RunAgainst(const std::string& address,
                             const std::string& arguments) {
-    const std::string command = std::string(FATHOM_CLI) + " --server " +
-                                address + " " + arguments + " 2>/dev/null";
+    // The redirection comes first: arguments may end with a here-document.
+    const std::string command = "2>/dev/null " + std::string(FATHOM_CLI) +
+                                " --server " + address + " " + arguments;
     Outcome outcome;
     FILE* pipe = popen(command.c_str(), "r");
     char buffer[4096];
