@@ -12,8 +12,8 @@
 namespace fathom::client::cli {
 namespace {
 
-absl::Status Bad(std::string message) {
-  return UsageError(absl::InvalidArgumentError(std::move(message)));
+absl::Status Bad(const std::string& message) {
+  return UsageError(absl::InvalidArgumentError(message));
 }
 
 std::string_view Trim(std::string_view text) {
