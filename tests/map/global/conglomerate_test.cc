@@ -168,6 +168,16 @@ TEST_F(Conglomerate, AfterAWriteTheWholePathIsSeenAgain) {
   EXPECT_EQ(map_.leaf_count(), 1u);
 }
 
+TEST_F(Conglomerate, AWriteBetweenTwoRunsIsSeenWithoutAView) {
+  MeasureAll(11000, [](double, double) { return 12.0; });
+  map_.Conglomerate();
+  const CellKey cell = root_.Locate(kNarragansett, 10).value();
+  map_.MergeArea(root_.Corners(cell), 10.1,
+                 [](const GeodeticPoint&) { return Measured(12, 0.2f); });
+  map_.Conglomerate();
+  EXPECT_EQ(map_.leaf_count(), 1u);
+}
+
 // The safety property: whatever is measured, in whatever order, and however
 // often leaves are joined, no mean is farther than the tolerance from what
 // the cell would hold had nothing ever been joined.

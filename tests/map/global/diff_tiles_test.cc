@@ -92,12 +92,24 @@ TEST_F(DiffTilesTest, ATileThatCollapsedIsGone) {
   EXPECT_EQ(changes.gone, std::vector<TileKey>{below_});
 }
 
-TEST_F(DiffTilesTest, WritingTheSameValueBackIsNoChange) {
+TEST_F(DiffTilesTest, AChartThatMeetsOnlyMeasurementsIsNoChange) {
   Measure(cell_, 10);
   const GlobalMapView before = map_.View();
-  // A chart leaves measured leaves alone; everything else stays unknown.
-  RasterBlock chart = FlatRaster(root_.Corners(cell_)[1], 1e-6, 4, 4, 3, 1);
+  ASSERT_TRUE(
+      map_.ImportRaster(FlatRaster(root_.Corners(cell_)[1], 1e-6, 4, 4, 3, 1))
+          .ok());
+  EXPECT_EQ(map_.View().root_tile(), before.root_tile());
+}
+
+TEST_F(DiffTilesTest, WritingTheSameValuesAgainIsNoChange) {
+  RasterBlock chart = FlatRaster(
+      {.latitude_deg = 41.51, .longitude_deg = -71.31}, 0.0005, 40, 40, 20, 1);
+  chart.replace = true;
   ASSERT_TRUE(map_.ImportRaster(chart).ok());
+  const GlobalMapView before = map_.View();
+  const auto again = map_.ImportRaster(chart);
+  ASSERT_TRUE(again.ok());
+  EXPECT_GT(again->leaves_written, 1000u);
   EXPECT_EQ(map_.View().root_tile(), before.root_tile());
 }
 

@@ -144,7 +144,7 @@ TEST(Tile, TotalsHoldWhatLiesBelow) {
               .leaves = {Prior(10), Prior(12), Leaf{}, Prior(11)}};
   // 51 / 255 of 0.5 m: 0.1 m to each side.
   slots.leaves[0].residual_code = 51;
-  const TileTotals& totals = slots.Build()->totals();
+  const TileTotals totals = slots.Build()->totals();
   EXPECT_EQ(totals.leaves, 4u);
   EXPECT_EQ(totals.known_leaves, 3u);
   EXPECT_FLOAT_EQ(totals.shoalest_m, 9.9f);
