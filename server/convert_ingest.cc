@@ -3,6 +3,8 @@
 #include <numbers>
 #include <optional>
 #include <utility>
+#include <variant>
+#include <vector>
 
 #include "absl/strings/str_format.h"
 #include "base/status_macros.h"
@@ -317,6 +319,32 @@ IngestMessage ToIngest(const v1::ContactReport& report, const FieldPath& path) {
     message.content = ToRefusal(converted.status());
   }
   return message;
+}
+
+absl::StatusOr<std::vector<IngestMessage>> ConvertReports(
+    const v1::ReportContactsRequest& request) {
+  const FieldPath root;
+  if (request.reports().empty()) {
+    return Missing(FieldPath(root, "reports"), "at least one report");
+  }
+  const auto count = static_cast<size_t>(request.reports_size());
+  if (count > kMaxReportsPerRequest) {
+    return LimitExceeded("reports", count, kMaxReportsPerRequest);
+  }
+  std::vector<IngestMessage> messages;
+  messages.reserve(count);
+  for (size_t i = 0; i < count; ++i) {
+    const v1::ContactReport& report = request.reports(static_cast<int>(i));
+    const FieldPath path(root, "reports", i);
+    FATHOM_RETURN_IF_ERROR(CheckNumbering(report, path));
+    IngestMessage message = ToIngest(report, path);
+    if (const auto* refusal = std::get_if<Refusal>(&message.content)) {
+      return InvalidField(refusal->field, refusal->description,
+                          static_cast<v1::RejectReason>(refusal->reason));
+    }
+    messages.push_back(std::move(message));
+  }
+  return messages;
 }
 
 void WriteRejection(uint64_t sequence, const Refusal& refusal,

@@ -12,7 +12,7 @@
 #define FATHOM_SERVER_CONVERT_INGEST_H_
 
 #include <cstdint>
-#include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -43,8 +43,13 @@ absl::StatusOr<map::ContactReport> ConvertReport(
 IngestMessage ToIngest(const v1::Ping& ping, const FieldPath& path);
 IngestMessage ToIngest(const v1::ContactReport& report, const FieldPath& path);
 
-// What a refused message's Rejection says. `prefix` stands before the field
-// that the keeper named ("ping." or "report.").
+// All reports of a batch, or the error of the first that is malformed.
+// Errors: INVALID_ARGUMENT (path from "reports"), RESOURCE_EXHAUSTED past
+// kMaxReportsPerRequest.
+absl::StatusOr<std::vector<IngestMessage>> ConvertReports(
+    const v1::ReportContactsRequest& request);
+
+// What a refused message's Rejection says.
 void WriteRejection(uint64_t sequence, const Refusal& refusal,
                     v1::Rejection* out);
 

@@ -2,13 +2,10 @@
 
 #include <memory>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "base/mutex.h"
-#include "base/status_macros.h"
 #include "server/convert_ingest.h"
-#include "server/field_checks.h"
 #include "server/ingest_stream.h"
 
 namespace fathom::server {
@@ -76,33 +73,6 @@ class ReportBatch final : public IngestListener {
   size_t under_way_ FATHOM_GUARDED_BY(mutex_);
   bool answered_ FATHOM_GUARDED_BY(mutex_) = false;
 };
-
-// All reports, or the error of the first that is malformed.
-absl::StatusOr<std::vector<IngestMessage>> ConvertReports(
-    const v1::ReportContactsRequest& request) {
-  const FieldPath root;
-  if (request.reports().empty()) {
-    return Missing(FieldPath(root, "reports"), "at least one report");
-  }
-  const auto count = static_cast<size_t>(request.reports_size());
-  if (count > kMaxReportsPerRequest) {
-    return LimitExceeded("reports", count, kMaxReportsPerRequest);
-  }
-  std::vector<IngestMessage> messages;
-  messages.reserve(count);
-  for (size_t i = 0; i < count; ++i) {
-    const v1::ContactReport& report = request.reports(static_cast<int>(i));
-    const FieldPath path(root, "reports", i);
-    FATHOM_RETURN_IF_ERROR(CheckNumbering(report, path));
-    IngestMessage message = ToIngest(report, path);
-    if (const auto* refusal = std::get_if<Refusal>(&message.content)) {
-      return InvalidField(refusal->field, refusal->description,
-                          static_cast<v1::RejectReason>(refusal->reason));
-    }
-    messages.push_back(std::move(message));
-  }
-  return messages;
-}
 
 }  // namespace
 

@@ -12,6 +12,7 @@
 #include <CLI/CLI.hpp>
 #include <atomic>
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
 #include <optional>
 #include <string>
@@ -190,14 +191,34 @@ sigset_t BlockEndSignals() {
   return signals;
 }
 
+// Removes the mission file that this program has just made unless Keep is
+// called: a start that fails leaves nothing behind and can be repeated.
+class NewFileGuard {
+ public:
+  explicit NewFileGuard(const std::string& path) : path_(path) {}
+  ~NewFileGuard() {
+    if (!path_.empty()) std::remove(path_.c_str());
+  }
+  NewFileGuard(const NewFileGuard&) = delete;
+  NewFileGuard& operator=(const NewFileGuard&) = delete;
+  void Keep() { path_.clear(); }
+
+ private:
+  std::string path_;
+};
+
 absl::Status Serve(Flags& flags) {
   FATHOM_RETURN_IF_ERROR(CheckListenOptions(flags.listen));
   const sigset_t signals = BlockEndSignals();
   // A client that goes away is an error of its call, not of the program.
   signal(SIGPIPE, SIG_IGN);
 
+  // The reason is told once, by us; gRPC's own lines are for its developers.
+  setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
+
   const SystemClock clock;
   FATHOM_ASSIGN_OR_RETURN(const auto file, OpenFile(flags, clock));
+  NewFileGuard guard(flags.create ? flags.mission_path : "");
   FATHOM_ASSIGN_OR_RETURN(MapKeeper::Restored restored, RestoreMission(*file));
   Log(LogLevel::kInfo, "mission opened path=%s revision=%d replayed=%d",
       flags.mission_path, restored.map->revision(), restored.journal_records);
@@ -222,6 +243,7 @@ absl::Status Serve(Flags& flags) {
                server->address(), flags.mission_path,
                keeper.View()->revision());
   std::fflush(stdout);
+  guard.Keep();
 
   int signal_number = 0;
   sigwait(&signals, &signal_number);

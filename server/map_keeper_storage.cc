@@ -166,12 +166,7 @@ void MapKeeper::TellDurable(std::vector<StorageItem>& items) {
       commands += 1;
     }
   }
-  for (const Durable& entry : durable) {
-    entry.listener->OnDurable(entry.newest, entry.count);
-  }
-  for (const StorageItem& item : items) {
-    if (item.done) item.done(absl::OkStatus());
-  }
+  // The room is given back first: who hears of it here may use it.
   std::vector<std::shared_ptr<IngestListener>> waiting;
   {
     MutexLock lock(mutex_);
@@ -179,6 +174,12 @@ void MapKeeper::TellDurable(std::vector<StorageItem>& items) {
     pending_bytes_ -= bytes;
     pending_commands_ -= commands;
     if (HasRoom()) waiting.swap(waiting_);
+  }
+  for (const Durable& entry : durable) {
+    entry.listener->OnDurable(entry.newest, entry.count);
+  }
+  for (const StorageItem& item : items) {
+    if (item.done) item.done(absl::OkStatus());
   }
   for (const auto& listener : waiting) listener->OnRoom();
 }

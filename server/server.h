@@ -24,9 +24,9 @@ struct ListenOptions {
   // "HOST:PORT" (port 0: any free one) or "unix:PATH".
   std::string address = "127.0.0.1:7430";
   // PEM files; all three or none.
-  std::string tls_cert;
-  std::string tls_key;
-  std::string tls_client_ca;
+  std::string tls_cert = "";
+  std::string tls_key = "";
+  std::string tls_client_ca = "";
 };
 
 // Whether the address is reached from this machine only.
