@@ -1,6 +1,7 @@
 #include "client/cli/canvas.h"
 
 #include "absl/strings/str_format.h"
+#include "client/cli/exit_code.h"
 
 namespace fathom::client::cli {
 
@@ -90,8 +91,8 @@ absl::Status Canvas::WritePng(const std::string& path) {
   const cairo_status_t status =
       cairo_surface_write_to_png(surface_.get(), path.c_str());
   if (status == CAIRO_STATUS_SUCCESS) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrFormat(
-      "%s: cannot be written: %s", path, cairo_status_to_string(status)));
+  return FileError(absl::InvalidArgumentError(absl::StrFormat(
+      "%s: cannot be written: %s", path, cairo_status_to_string(status))));
 }
 
 }  // namespace fathom::client::cli

@@ -215,7 +215,8 @@ absl::Status Run(const Session& session, const RenderFlags& flags) {
                               std::chrono::floor<std::chrono::seconds>(
                                   view.time.value_or(session.Now())));
   if (const absl::Status drawn = DrawPicture(picture, flags.out); !drawn.ok()) {
-    return UsageError(drawn);
+    // A file that cannot be written is marked already.
+    return ExitCodeOf(drawn) == ExitCode::kBadFile ? drawn : UsageError(drawn);
   }
   if (session.json) {
     nlohmann::ordered_json document;
