@@ -1,0 +1,246 @@
+// The main job through our client library against a real fathomd, and the
+// promise that a ping stream makes: a server that is killed and started again
+// on the same port costs nothing and doubles nothing.
+
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "client/client.h"
+#include "tests/testing/status_matchers.h"
+
+namespace fathom::client {
+namespace {
+
+using std::chrono::steady_clock;
+
+constexpr auto kDeadline = std::chrono::seconds(60);
+
+// A fathomd process, killed with this object.
+class LiveServer {
+ public:
+  LiveServer(std::filesystem::path folder, bool create, int port = 0)
+      : folder_(std::move(folder)) {
+    const auto port_file = folder_ / "port";
+    std::filesystem::remove(port_file);
+    std::vector<std::string> arguments = {FATHOM_FATHOMD,
+                                          "--mission",
+                                          folder_ / "m.fathom",
+                                          "--listen",
+                                          absl::StrCat("127.0.0.1:", port),
+                                          "--port-file",
+                                          port_file,
+                                          "--log-level",
+                                          "error"};
+    if (create) {
+      for (const char* argument : {"--create", "--center", "41.5,-71.4",
+                                   "--side-nmi", "20", "--datum", "MLLW"}) {
+        arguments.emplace_back(argument);
+      }
+    }
+    std::vector<char*> argv;
+    for (std::string& argument : arguments) argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    pid_ = fork();
+    if (pid_ == 0) {
+      execv(argv[0], argv.data());
+      _exit(127);
+    }
+    const auto deadline = steady_clock::now() + kDeadline;
+    while (port_ == 0 && steady_clock::now() < deadline) {
+      std::ifstream(port_file) >> port_;
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+  }
+
+  ~LiveServer() { Kill(); }
+  LiveServer(const LiveServer&) = delete;
+  LiveServer& operator=(const LiveServer&) = delete;
+
+  void Kill() { End(SIGKILL); }
+
+  // The exit code.
+  int Terminate() { return End(SIGTERM); }
+
+  int port() const { return port_; }
+  std::string address() const { return absl::StrCat("127.0.0.1:", port_); }
+
+ private:
+  int End(int signal_number) {
+    if (pid_ <= 0) return -1;
+    kill(pid_, signal_number);
+    int state = 0;
+    waitpid(pid_, &state, 0);
+    pid_ = -1;
+    return WIFEXITED(state) ? WEXITSTATUS(state) : -1;
+  }
+
+  const std::filesystem::path folder_;
+  pid_t pid_ = -1;
+  int port_ = 0;
+};
+
+class ClientLive : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name =
+        (std::filesystem::temp_directory_path() / "fathom-live-XXXXXX")
+            .string();
+    ASSERT_NE(mkdtemp(name.data()), nullptr);
+    folder_ = name;
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::filesystem::path folder_;
+};
+
+v1::StartActivityRequest Bay() {
+  v1::StartActivityRequest request;
+  request.set_activity_id("bay");
+  auto* parameters = request.mutable_parameters();
+  parameters->mutable_south_west()->set_latitude_deg(41.499);
+  parameters->mutable_south_west()->set_longitude_deg(-71.402);
+  parameters->set_north_extent_m(300);
+  parameters->set_east_extent_m(400);
+  parameters->set_cell_size_m(10);
+  parameters->set_estimator(v1::ESTIMATOR_KALMAN);
+  return request;
+}
+
+// One beam of 20 m +- 3 m, 50 m east of 41.5 N 71.4 W.
+v1::Ping OneBeam() {
+  v1::Ping ping;
+  ping.set_activity_id("bay");
+  ping.mutable_time()->set_seconds(1'767'225'600);
+  auto* pose = ping.mutable_pose();
+  pose->mutable_position()->set_latitude_deg(41.5);
+  pose->mutable_position()->set_longitude_deg(-71.4);
+  pose->set_heading_deg(90);
+  ping.add_range_m(50);
+  ping.add_bearing_deg(0);
+  ping.add_depth_m(20);
+  ping.add_std_m(3);
+  return ping;
+}
+
+// 50 / 83 490 degrees east of 71.4 W: where that beam hits.
+v1::QueryObstacleRequest WhereItHits(double depth_m, uint64_t min_revision) {
+  v1::QueryObstacleRequest request;
+  request.mutable_position()->set_latitude_deg(41.5);
+  request.mutable_position()->set_longitude_deg(-71.4 + 50 / 83'490.0);
+  request.set_depth_m(depth_m);
+  request.set_confidence(0.95);
+  request.set_min_revision(min_revision);
+  return request;
+}
+
+TEST_F(ClientLive, MainJobFromAChartToTheGlobalMap) {
+  LiveServer server(folder_, /*create=*/true);
+  ASSERT_NE(server.port(), 0);
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto client,
+                              Client::Connect(server.address(), {}));
+
+  v1::PriorHeader header;
+  header.set_name("chart");
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto writer, client->ImportPrior(header));
+  v1::DepthTile tile;
+  tile.mutable_north_west()->set_latitude_deg(41.51);
+  tile.mutable_north_west()->set_longitude_deg(-71.41);
+  tile.set_latitude_step_deg(0.001);
+  tile.set_longitude_step_deg(0.001);
+  tile.set_rows(20);
+  tile.set_columns(20);
+  tile.mutable_depth_m()->Resize(400, 30);
+  tile.add_std_m(4);
+  FATHOM_ASSERT_OK(writer->Write(tile));
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto imported, writer->Finish());
+  EXPECT_EQ(imported.cells_with_depth(), 400u);
+
+  FATHOM_ASSERT_OK(client->StartActivity(Bay()).status());
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto stream,
+                              client->OpenPingStream({.source_id = "uuv"}));
+  v1::Ping ping = OneBeam();
+  FATHOM_ASSERT_OK(stream->Send(ping).status());
+  FATHOM_ASSERT_OK(stream->Finish());
+  EXPECT_EQ(stream->progress().measurements_accepted, 1u);
+
+  // Prior N(30, 16) and sounding N(20, 9), eqs. 4.17, 4.18, 4.20:
+  // k = 16/25, mean = 30 - 6.4 = 23.6, std = 4 x 0.6 = 2.4.
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto answer,
+                              client->QueryObstacle(WhereItHits(
+                                  23.6, stream->progress().map_revision)));
+  EXPECT_NEAR(answer.answer().seabed().depth_m(), 23.6, 1e-3);
+  EXPECT_NEAR(answer.answer().seabed().std_m(), 2.4, 1e-3);
+  EXPECT_NEAR(answer.answer().probability(), 0.5, 1e-3);
+
+  v1::CompleteActivityRequest complete;
+  complete.set_activity_id("bay");
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto completed,
+                              client->CompleteActivity(complete));
+  EXPECT_EQ(completed.transfer().local_cells(), 1u);
+  FATHOM_ASSERT_OK_AND_ASSIGN(
+      const auto after,
+      client->QueryObstacle(WhereItHits(23.6, completed.map_revision())));
+  EXPECT_EQ(after.answer().seabed().layer(), v1::MAP_LAYER_GLOBAL);
+  // The leaf's std is coded in steps of 0.2 %.
+  EXPECT_NEAR(after.answer().seabed().depth_m(), 23.6, 0.1);
+  EXPECT_EQ(server.Terminate(), 0);
+}
+
+TEST_F(ClientLive, APingStreamSurvivesKillsWithNothingLostOrDoubled) {
+  auto server = std::make_unique<LiveServer>(folder_, /*create=*/true);
+  ASSERT_NE(server->port(), 0);
+  const int port = server->port();
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto client,
+                              Client::Connect(server->address(), {}));
+  FATHOM_ASSERT_OK(client->StartActivity(Bay()).status());
+  FATHOM_ASSERT_OK_AND_ASSIGN(
+      const auto stream,
+      client->OpenPingStream({.source_id = "uuv", .patience = kDeadline}));
+
+  constexpr uint64_t kKills = 3;
+  constexpr uint64_t kPingsBetween = 2000;
+  v1::Ping ping = OneBeam();
+  for (uint64_t i = 0; i < kKills; ++i) {
+    for (uint64_t n = 0; n < kPingsBetween; ++n) {
+      FATHOM_ASSERT_OK(stream->Send(ping).status());
+    }
+    // Half of them applied, the rest on the way: not flushed.
+    FATHOM_ASSERT_OK(
+        stream->WaitApplied(kPingsBetween * i + kPingsBetween / 2));
+    server->Kill();
+    server = std::make_unique<LiveServer>(folder_, /*create=*/false, port);
+    ASSERT_EQ(server->port(), port);
+  }
+  FATHOM_ASSERT_OK(stream->Finish());
+  constexpr uint64_t kPings = kKills * kPingsBetween;
+  EXPECT_EQ(stream->progress().durable_sequence, kPings);
+  EXPECT_GE(stream->progress().reconnects, 1u);
+  EXPECT_TRUE(stream->progress().gaps.empty());
+  EXPECT_TRUE(stream->progress().rejections.empty());
+
+  // Each was counted once.
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto status, client->GetMissionStatus());
+  ASSERT_EQ(status.activities_size(), 1);
+  EXPECT_EQ(status.activities(0).measurements_accepted(), kPings);
+  // And weighed once: n soundings of 3 m without a prior are 3 / sqrt(6000).
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto answer,
+                              client->QueryObstacle(WhereItHits(10, 0)));
+  EXPECT_NEAR(answer.answer().seabed().std_m(), 0.0387298, 1e-5);
+  EXPECT_EQ(server->Terminate(), 0);
+}
+
+}  // namespace
+}  // namespace fathom::client
