@@ -71,17 +71,16 @@ std::vector<Ship> MakeShips(const LocalTerrain& terrain, const SurveyArea& area,
       const double course_rad = random.Uniform(0.0, 2.0 * std::numbers::pi);
       ship.north_m_s = speed_m_s * std::cos(course_rad);
       ship.east_m_s = speed_m_s * std::sin(course_rad);
-      const double north = random.Uniform(-1.0, 2.0);
-      const double east = random.Uniform(-1.0, 2.0);
+      const double north = random.Uniform(-0.2, 1.2);
+      const double east = random.Uniform(-0.2, 1.2);
       if (i == 0) {
         ship.start = StartOfCrossing(vehicle, ship, 0.4 * options.duration_s,
                                      options.crossing_m, north < 0.5);
       } else {
-        // Half way through the run it is near the area.
-        const double half_s = 0.5 * options.duration_s;
+        const double pass_s = options.duration_s * i / (options.count - 1);
         ship.start = {
-            .north_m = north * area.north_extent_m - half_s * ship.north_m_s,
-            .east_m = east * area.east_extent_m - half_s * ship.east_m_s};
+            .north_m = north * area.north_extent_m - pass_s * ship.north_m_s,
+            .east_m = east * area.east_extent_m - pass_s * ship.east_m_s};
       }
       const double share = WetShare(terrain, ship, options.duration_s);
       if (share > best_share) {

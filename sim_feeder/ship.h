@@ -41,9 +41,10 @@ struct ShipOptions {
   double crossing_m = 120.0;
 };
 
-// The first ship crosses near the vehicle; the others go their way within an
-// area's width about the area. Of 32 drawn courses a ship takes the first
-// that is 95 % over water (places off the terrain count as water), else the
+// The first ship crosses near the vehicle. The others pass the area one after
+// the other, the last at the end of the run: ships of constant velocity are
+// soon far away on a long one. Of 32 drawn courses a ship takes the first that
+// is 95 % over water (places off the terrain count as water), else the
 // wettest. Classes take turns. Deterministic in `random`.
 std::vector<Ship> MakeShips(const LocalTerrain& terrain, const SurveyArea& area,
                             const Vehicle& vehicle, const ShipOptions& options,

@@ -165,6 +165,18 @@ TEST(Simulation, TheFirstShipCrossesNearTheVehicle) {
       120.0, 1e-6);
 }
 
+TEST(Simulation, TheLastShipIsNearTheAreaAtTheEnd) {
+  const auto simulation =
+      *Simulation::Create(SmallScenario(), MakePlaneSeabed(Rough));
+  const PlanePoint ship =
+      simulation->ships().back().PlaceAt(simulation->duration_s());
+  // Within a fifth of its 200 m.
+  EXPECT_GE(ship.north_m, -40.0);
+  EXPECT_LE(ship.north_m, 240.0);
+  EXPECT_GE(ship.east_m, -40.0);
+  EXPECT_LE(ship.east_m, 240.0);
+}
+
 TEST(Simulation, CoversTheAreaOnceWhenNoNumberOfPingsIsGiven) {
   Scenario scenario = SmallScenario();
   scenario.pings = 0;
