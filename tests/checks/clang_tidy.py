@@ -5,11 +5,11 @@ A file is skipped when it was clean before with the same inputs: its own text,
 every header that its object was built from (ninja's dependency log), its
 compile command, the .clang-tidy files and the version of clang-tidy. So build
 first; a file without an object is always checked. Clean keys are empty files in
-build/tidy/.
+the user's cache folder (fathom/tidy), so a fresh clone knows them too.
 
 clang's -Wthread-safety is on: GUARDED_BY is checked here (base/mutex.h).
 
-Usage: clang_tidy.py [--build DIR] [--jobs N] [FILE...]
+Usage: clang_tidy.py [--build DIR] [--jobs N] [--skip ROOM]... [FILE...]
 Exit 0: clean, 1: findings, 2: misuse
 """
 
@@ -125,6 +125,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--build", default=os.path.join(ROOT, "build", "dev"))
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--skip", action="append", default=[], metavar="ROOM")
     parser.add_argument("files", nargs="*", metavar="FILE")
     options = parser.parse_args()
     build = os.path.abspath(options.build)
@@ -140,11 +141,16 @@ def main():
             print(f"not compiled: {' '.join(sorted(unknown))}")
             return 2
         commands = {s: c for s, c in commands.items() if s in wanted}
+    commands = {s: c for s, c in commands.items()
+                if os.path.relpath(s, ROOT).split(os.sep)[0]
+                not in options.skip}
     if not commands:
         print("no source of ours in compile_commands.json: wrong folder?")
         return 2
 
-    cache = os.path.join(ROOT, "build", "tidy")
+    cache = os.path.join(
+        os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"),
+        "fathom", "tidy")
     os.makedirs(cache, exist_ok=True)
     version = subprocess.run(["clang-tidy", "--version"], capture_output=True,
                              check=True).stdout

@@ -3,11 +3,15 @@
 // does nothing else: what a call costs here is gRPC, Protobuf and the kernel.
 //
 //   fathom-null-server --port-file FILE     (loopback, any free port)
+#include <grpcpp/alarm.h>
 #include <grpcpp/grpcpp.h>
 
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <fstream>
 #include <iostream>
+#include <memory>
+#include <mutex>
 #include <string>
 
 #include "fathom/v1/ingest_service.grpc.pb.h"
@@ -16,9 +20,8 @@
 namespace fathom::bench {
 namespace {
 
-// The number of messages behind one ack: about what a group commit of a few
-// milliseconds coalesces at full speed.
-constexpr uint64_t kPingsPerAck = 64;
+// The shortest group commit of the design (2-20 ms).
+constexpr std::chrono::milliseconds kAckDelay{2};
 
 class NullObstacleService final : public v1::ObstacleService::CallbackService {
  public:
@@ -66,7 +69,8 @@ class NullObstacleService final : public v1::ObstacleService::CallbackService {
   }
 };
 
-// Reads pings and throws them away; acks every kPingsPerAck and at the end.
+// Reads pings and throws them away; acks what has come once every kAckDelay,
+// as a group commit that costs nothing would.
 class NullPingReactor final
     : public grpc::ServerBidiReactor<v1::StreamPingsRequest,
                                      v1::StreamPingsResponse> {
@@ -74,64 +78,66 @@ class NullPingReactor final
   NullPingReactor() { StartRead(&request_); }
 
   void OnReadDone(bool ok) override {
+    const std::lock_guard lock(mutex_);
     if (!ok) {
       read_all_ = true;
-      // OnWriteDone ends the stream if a write is on its way.
-      if (!writing_.exchange(true)) {
-        WriteLast();
-      }
+      Advance();
       return;
     }
-    const v1::Ping& ping = request_.ping();
-    epoch_ = ping.epoch();
-    received_ = ping.sequence();
-    if (received_ % kPingsPerAck == 0 && !writing_.exchange(true)) {
-      Write();
-    }
+    epoch_ = request_.ping().epoch();
+    received_ = request_.ping().sequence();
+    Advance();
     StartRead(&request_);
   }
 
-  void OnWriteDone(bool ok) override {
-    if (!ok || finishing_) {
-      Finish(grpc::Status::OK);
-    } else if (read_all_) {
-      WriteLast();
-    } else {
-      writing_ = false;
-      // Reading may have ended between the two lines above.
-      if (read_all_ && !writing_.exchange(true)) {
-        WriteLast();
-      }
-    }
+  void OnWriteDone(bool /*ok*/) override {
+    const std::lock_guard lock(mutex_);
+    busy_ = false;
+    Advance();
   }
 
   void OnDone() override { delete this; }
 
  private:
-  void Fill() {
-    response_.set_epoch(epoch_);
-    response_.set_applied_sequence(received_);
-    response_.set_durable_sequence(received_);
-    response_.set_map_revision(received_);
-    response_.set_pings_applied(received_);
-    response_.set_measurements_accepted(received_ * 101);
-  }
-  void Write() {
-    Fill();
-    StartWrite(&response_);
-  }
-  void WriteLast() {
-    finishing_ = true;
-    Write();
+  // With mutex_ held: starts the wait for the next ack, or ends the stream.
+  void Advance() {
+    if (busy_) {
+      return;
+    }
+    if (received_ == acked_) {
+      if (read_all_) {
+        busy_ = true;
+        Finish(grpc::Status::OK);
+      }
+      return;
+    }
+    busy_ = true;
+    alarm_.Set(std::chrono::system_clock::now() + kAckDelay,
+               [this](bool /*ok*/) { Ack(); });
   }
 
+  void Ack() {
+    const std::lock_guard lock(mutex_);
+    acked_ = received_;
+    response_.set_epoch(epoch_);
+    response_.set_applied_sequence(acked_);
+    response_.set_durable_sequence(acked_);
+    response_.set_map_revision(acked_);
+    response_.set_pings_applied(acked_);
+    response_.set_measurements_accepted(acked_ * 101);
+    StartWrite(&response_);
+  }
+
+  std::mutex mutex_;
+  grpc::Alarm alarm_;
   v1::StreamPingsRequest request_;
   v1::StreamPingsResponse response_;
-  std::atomic<uint64_t> epoch_ = 0;
-  std::atomic<uint64_t> received_ = 0;
-  std::atomic<bool> writing_ = false;
-  std::atomic<bool> read_all_ = false;
-  std::atomic<bool> finishing_ = false;
+  uint64_t epoch_ = 0;
+  uint64_t received_ = 0;
+  uint64_t acked_ = 0;
+  // An ack waits or is on its way, or the stream has been finished.
+  bool busy_ = false;
+  bool read_all_ = false;
 };
 
 class NullIngestService final : public v1::IngestService::CallbackService {
