@@ -286,8 +286,9 @@ absl::StatusOr<std::uint64_t> SequencedStream::Send(const Encoder& encode) {
     if (finishing_) {
       return absl::FailedPreconditionError("the stream was finished");
     }
-    FATHOM_RETURN_IF_ERROR(
-        WaitUntil([&]() { return ConnectionUp() && buffer_.HasRoom(bytes); }));
+    FATHOM_RETURN_IF_ERROR(WaitUntil([&]() FATHOM_REQUIRES(mutex_) {
+      return ConnectionUp() && buffer_.HasRoom(bytes);
+    }));
     buffer_.Push(grpc::ByteBuffer(&slice, 1), bytes);
     if (!connection_->writing()) idle = connection_;
   }
@@ -296,7 +297,7 @@ absl::StatusOr<std::uint64_t> SequencedStream::Send(const Encoder& encode) {
 }
 
 absl::Status SequencedStream::WaitUntil(const std::function<bool()>& done) {
-  const auto mark = [this]() {
+  const auto mark = [this]() FATHOM_REQUIRES(mutex_) {
     return progress_.applied_sequence + buffer_.durable_sequence();
   };
   std::uint64_t last_mark = mark();
@@ -358,7 +359,9 @@ absl::Status SequencedStream::Flush() {
   // taken is durable, but the caller must not read that as success.
   if (!permanent_.ok()) return permanent_;
   const std::uint64_t last = buffer_.last_sequence();
-  return WaitUntil([&]() { return buffer_.durable_sequence() >= last; });
+  return WaitUntil([&]() FATHOM_REQUIRES(mutex_) {
+    return buffer_.durable_sequence() >= last;
+  });
 }
 
 absl::Status SequencedStream::WaitApplied(std::uint64_t sequence) {
@@ -367,7 +370,9 @@ absl::Status SequencedStream::WaitApplied(std::uint64_t sequence) {
     return absl::InvalidArgumentError(absl::StrFormat(
         "sequence=%d: only %d were sent", sequence, buffer_.last_sequence()));
   }
-  return WaitUntil([&]() { return progress_.applied_sequence >= sequence; });
+  return WaitUntil([&]() FATHOM_REQUIRES(mutex_) {
+    return progress_.applied_sequence >= sequence;
+  });
 }
 
 absl::Status SequencedStream::Finish() {
@@ -376,7 +381,7 @@ absl::Status SequencedStream::Finish() {
   {
     MutexLock lock(mutex_);
     if (finished_.has_value()) return *finished_;
-    FATHOM_RETURN_IF_ERROR(WaitUntil([&]() {
+    FATHOM_RETURN_IF_ERROR(WaitUntil([&]() FATHOM_REQUIRES(mutex_) {
       return buffer_.durable_sequence() >= buffer_.last_sequence();
     }));
     finishing_ = true;

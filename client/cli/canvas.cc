@@ -78,7 +78,8 @@ void Canvas::Hatch(const Rectangle& r) {
   cairo_paint(cairo());
   cairo_set_source_rgb(cairo(), 0.78, 0.79, 0.80);
   cairo_set_line_width(cairo(), 1);
-  for (double offset = -r.height; offset < r.width; offset += kSpacing) {
+  for (int i = 0; i * kSpacing < r.width + r.height; ++i) {
+    const double offset = i * kSpacing - r.height;
     cairo_move_to(cairo(), r.x + offset, r.y + r.height);
     cairo_line_to(cairo(), r.x + offset + r.height, r.y);
   }

@@ -235,10 +235,8 @@ void MapPanel::DrawGraticule() {
   const TextStyle small{.size = 12, .color = {0.3, 0.33, 0.37}};
 
   const double column_step = GraticuleStep(width_deg, 6);
-  for (double i = std::ceil(west / column_step - 1e-9);
-       i * column_step <= west + width_deg + 1e-9; ++i) {
-    const double x =
-        frame_.x + frame_.width * (i * column_step - west) / width_deg;
+  for (const double mark : Multiples(column_step, west, west + width_deg)) {
+    const double x = frame_.x + frame_.width * (mark - west) / width_deg;
     canvas_.SetColor(kFrameColor, 0.13);
     canvas_.Line(x, frame_.y, x, frame_.y + frame_.height, 0.8);
     canvas_.SetColor(kFrameColor);
@@ -246,15 +244,12 @@ void MapPanel::DrawGraticule() {
                  1);
     TextStyle style = small;
     style.align = Align::kCenter;
-    canvas_.Text(
-        AngleText(WrapLongitude(i * column_step), column_step, 'E', 'W'), x,
-        frame_.y + frame_.height + 20, style);
+    canvas_.Text(AngleText(WrapLongitude(mark), column_step, 'E', 'W'), x,
+                 frame_.y + frame_.height + 20, style);
   }
   const double row_step = GraticuleStep(height_deg, 6);
-  for (double i = std::ceil((north - height_deg) / row_step - 1e-9);
-       i * row_step <= north + 1e-9; ++i) {
-    const double y =
-        frame_.y + frame_.height * (north - i * row_step) / height_deg;
+  for (const double mark : Multiples(row_step, north - height_deg, north)) {
+    const double y = frame_.y + frame_.height * (north - mark) / height_deg;
     canvas_.SetColor(kFrameColor, 0.13);
     canvas_.Line(frame_.x, y, frame_.x + frame_.width, y, 0.8);
     canvas_.SetColor(kFrameColor);
@@ -262,7 +257,7 @@ void MapPanel::DrawGraticule() {
     // Along the side, so that the margin stays narrow.
     // The corners belong to the longitudes.
     if (y > frame_.y + frame_.height - 24 || y < frame_.y + 24) continue;
-    const std::string text = AngleText(i * row_step, row_step, 'N', 'S');
+    const std::string text = AngleText(mark, row_step, 'N', 'S');
     cairo_save(cairo);
     cairo_translate(cairo, frame_.x - 9, y);
     cairo_rotate(cairo, -std::numbers::pi / 2);

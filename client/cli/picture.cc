@@ -31,7 +31,8 @@ constexpr Color kGrey = {0.38, 0.41, 0.45};
 
 void DrawColorBar(Canvas& canvas, const Rectangle& bar, const Colormap& colors,
                   const ValueScale& scale, const std::string& caption) {
-  for (double x = 0; x < bar.width; ++x) {
+  for (int i = 0; i < bar.width; ++i) {
+    const double x = i;
     canvas.SetColor(colors.At(x / bar.width));
     canvas.Fill({bar.x + x, bar.y, std::min(1.5, bar.width - x), bar.height});
   }

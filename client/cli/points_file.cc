@@ -34,8 +34,8 @@ constexpr std::size_t kDefaultPart = 10'000;
 constexpr std::size_t kAbsent = static_cast<std::size_t>(-1);
 using Order = std::array<std::size_t, kColumns>;
 
-absl::Status BadFile(std::string message) {
-  return FileError(absl::InvalidArgumentError(std::move(message)));
+absl::Status BadFile(const std::string& message) {
+  return FileError(absl::InvalidArgumentError(message));
 }
 
 absl::StatusOr<Order> ReadHeader(const std::vector<std::string>& fields) {

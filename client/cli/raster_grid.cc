@@ -82,9 +82,10 @@ std::vector<GridBlock> CutIntoBlocks(const LonLatGrid& grid,
                                      std::int64_t max_cells) {
   // First the columns, at each antimeridian between two cell middles.
   std::vector<std::int64_t> cuts = {0};
-  const double first_turn = std::floor((grid.CenterLongitude(0) + 180) / 360);
-  for (double turn = first_turn + 1;; ++turn) {
-    const double meridian_deg = turn * 360 - 180;
+  double meridian_deg =
+      360 * std::floor((grid.CenterLongitude(0) + 180) / 360) - 180;
+  while (true) {
+    meridian_deg += 360;
     const auto cut = static_cast<std::int64_t>(
         std::ceil((meridian_deg - grid.west_deg) / grid.longitude_step_deg -
                   0.5 + kEdgeSlack));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "absl/strings/str_format.h"
 
@@ -27,6 +28,17 @@ double RoundStep(double value) {
     if (factor * power <= value * (1 + 1e-9)) return factor * power;
   }
   return power;
+}
+
+std::vector<double> Multiples(double step, double low, double high) {
+  // A millionth of a step forgives rounding at the ends.
+  const auto first = static_cast<std::int64_t>(std::ceil(low / step - 1e-6));
+  const auto last = static_cast<std::int64_t>(std::floor(high / step + 1e-6));
+  std::vector<double> values;
+  for (std::int64_t i = first; i <= last; ++i) {
+    values.push_back(static_cast<double>(i) * step);
+  }
+  return values;
 }
 
 ValueScale::ValueScale(double low, double high, Kind kind)
@@ -90,22 +102,19 @@ std::vector<double> ValueScale::Ticks(int most) const {
     const double spacing = 0.6 / most;
     if (kind_ == Kind::kRoot) ticks.push_back(low_);
     const double first = kind_ == Kind::kRoot ? 1e-3 * high_ : low_;
-    for (double value = RoundUp(first); value < high_ * 0.999;
-         value = RoundUp(value * 1.001)) {
+    double value = RoundUp(first);
+    while (value < high_ * 0.999) {
       const bool far =
           ticks.empty() || Place(value) - Place(ticks.back()) > spacing;
       if (far && 1 - Place(value) > spacing) ticks.push_back(value);
+      value = RoundUp(value * 1.001);
     }
     ticks.push_back(high_);
     return ticks;
   }
   double step = RoundStep((high_ - low_) / most);
   while ((high_ - low_) / step > most + 0.5) step = RoundStep(step * 2.6);
-  for (double i = std::ceil(low_ / step - 1e-6);
-       i * step <= high_ + 1e-6 * step; ++i) {
-    ticks.push_back(i * step);
-  }
-  return ticks;
+  return Multiples(step, low_, high_);
 }
 
 std::string ValueScale::TickText(double value) {

@@ -12,6 +12,9 @@ namespace fathom::client::cli {
 // The largest of 1, 2, 5 times a power of ten that is at most `value` > 0.
 double RoundStep(double value);
 
+// The multiples of `step` > 0 in [low, high], rising.
+std::vector<double> Multiples(double step, double low, double high);
+
 class ValueScale {
  public:
   enum class Kind {
