@@ -53,10 +53,8 @@ std::optional<DepthEstimate> ReadSmoothed(CellIndex cell,
                                           double scale, double cell_size_m,
                                           const MeasuredReader& read) {
   if (scale <= 0.0) return std::nullopt;
-  const std::size_t rows =
-      static_cast<std::size_t>(bounds.north - bounds.south + 1);
-  const std::size_t cols =
-      static_cast<std::size_t>(bounds.east - bounds.west + 1);
+  const auto rows = static_cast<std::size_t>(bounds.north - bounds.south) + 1;
+  const auto cols = static_cast<std::size_t>(bounds.east - bounds.west) + 1;
   std::vector<std::optional<DepthEstimate>> box(rows * cols);
   bool any = false;
   for (std::size_t k = 0; k < box.size(); ++k) {
