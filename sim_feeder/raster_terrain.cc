@@ -60,7 +60,8 @@ struct ProjectedReference {
   std::unique_ptr<OGRCoordinateTransformation> to_wgs84;
 };
 
-Georeference MakeProjected(std::shared_ptr<ProjectedReference> reference) {
+Georeference MakeProjected(
+    const std::shared_ptr<ProjectedReference>& reference) {
   Georeference result;
   result.to_grid =
       [reference](const map::GeodeticPoint& point) -> std::optional<GridPoint> {
@@ -128,7 +129,7 @@ absl::StatusOr<Georeference> MakeGeoreference(
         absl::StrFormat("%s: no way from WGS84 to its coordinate system: %s",
                         path, CPLGetLastErrorMsg()));
   }
-  return MakeProjected(std::move(reference));
+  return MakeProjected(reference);
 }
 
 // Side of a cell in metres, at the raster's middle.

@@ -38,12 +38,14 @@ WaterGrid::WaterGrid(const LocalTerrain& terrain, const SurveyArea& area,
     const PlanePoint center = CenterOf(i);
     bool hole = false;
     for (int k = 0; k < looks * looks && !hole; ++k) {
+      const int row = k / looks;
+      const int column = k % looks;
       const double north_m =
           center.north_m +
-          (static_cast<double>(k / looks) / (looks - 1) - 0.5) * cell_m_;
+          (static_cast<double>(row) / (looks - 1) - 0.5) * cell_m_;
       const double east_m =
           center.east_m +
-          (static_cast<double>(k % looks) / (looks - 1) - 0.5) * cell_m_;
+          (static_cast<double>(column) / (looks - 1) - 0.5) * cell_m_;
       const std::optional<double> depth_m = terrain.DepthAt(north_m, east_m);
       if (!depth_m.has_value()) hole = true;
       if (!depth_m.has_value() || *depth_m < min_water_m) open_[i] = 0;
@@ -66,8 +68,10 @@ std::size_t WaterGrid::IndexOf(const PlanePoint& place) const {
 }
 
 PlanePoint WaterGrid::CenterOf(std::size_t index) const {
-  return {.north_m = (static_cast<double>(index / columns_) + 0.5) * cell_m_,
-          .east_m = (static_cast<double>(index % columns_) + 0.5) * cell_m_};
+  const std::size_t row = index / columns_;
+  const std::size_t column = index % columns_;
+  return {.north_m = (static_cast<double>(row) + 0.5) * cell_m_,
+          .east_m = (static_cast<double>(column) + 0.5) * cell_m_};
 }
 
 void WaterGrid::CloseAround(std::size_t index) {
