@@ -31,8 +31,8 @@ void MapPanel::DrawTrack(const std::vector<v1::GeodeticPoint>& track) {
         cairo_line_to(cairo, p.x, p.y);
       }
     }
-    canvas_.SetColor(halo ? kWhiteColor : kTrackColor, halo ? 0.75 : 1);
-    cairo_set_line_width(cairo, halo ? 3.6 : 1.6);
+    canvas_.SetColor(halo ? kWhiteColor : kTrackColor, halo ? 0.55 : 1);
+    cairo_set_line_width(cairo, halo ? 2.8 : 1.4);
     cairo_stroke(cairo);
   }
   const Point start = ToPixel(track.front());
@@ -47,6 +47,31 @@ void MapPanel::DrawTrack(const std::vector<v1::GeodeticPoint>& track) {
     cairo_stroke(cairo);
   }
   cairo_restore(cairo);
+}
+
+void MapPanel::PlaceLabel(const std::string& text, Point at, bool ends_at,
+                          double size) {
+  TextStyle style{
+      .size = size, .color = kContactColor, .bold = true, .halo = 2};
+  const double width = canvas_.TextWidth(text, style);
+  if (ends_at) at.x -= width;
+  at.x =
+      std::clamp(at.x, frame_.x + 6,
+                 std::max(frame_.x + 6, frame_.x + frame_.width - 6 - width));
+  at.y = std::clamp(at.y, frame_.y + 16, frame_.y + frame_.height - 8);
+  // Down, line by line, until it covers no other label.
+  constexpr int kMostLines = 12;
+  for (int line = 0; line < kMostLines; ++line) {
+    const bool covers = std::any_of(
+        labels_.begin(), labels_.end(), [&](const Rectangle& other) {
+          return at.x < other.x + other.width && other.x < at.x + width &&
+                 std::abs(at.y - other.y) < size + 3;
+        });
+    if (!covers) break;
+    at.y += size + 4;
+  }
+  labels_.push_back({at.x, at.y, width, size});
+  canvas_.Text(text, at.x, at.y, style);
 }
 
 void MapPanel::DrawContacts(const std::vector<v1::ContactEstimate>& contacts) {
@@ -98,8 +123,10 @@ void MapPanel::DrawContacts(const std::vector<v1::ContactEstimate>& contacts) {
     canvas_.SetColor(kWhiteColor);
     cairo_set_line_width(cairo, 1);
     cairo_stroke(cairo);
-    canvas_.Text(contact.contact_id(), p.x + 8, p.y - 7,
-                 {.size = 13, .color = kContactColor, .bold = true, .halo = 2});
+    // Beside the line of motion, not on it.
+    const bool left = east_px > 0 && north_px > 0;
+    PlaceLabel(contact.contact_id(), {p.x + (left ? -8 : 8), p.y - 7}, left,
+               13);
   }
   cairo_restore(cairo);
 }
@@ -132,19 +159,12 @@ void MapPanel::DrawContactOutside(const v1::ContactEstimate& contact,
   const double away_m =
       (std::hypot(dx, dy) - std::hypot(at.x - middle.x, at.y - middle.y)) *
       meters_per_pixel_;
-  const bool right = dx > 0;
-  canvas_.Text(
+  const std::string text =
       absl::StrFormat("%s, %s", contact.contact_id(),
                       away_m >= 1000 ? absl::StrFormat("%.1f km", away_m / 1000)
-                                     : absl::StrFormat("%.0f m", away_m)),
-      std::clamp(at.x + (right ? -13 : 13), frame_.x + 8,
-                 frame_.x + frame_.width - 8),
-      std::clamp(at.y + 4, frame_.y + 18, frame_.y + frame_.height - 8),
-      {.size = 12,
-       .color = kContactColor,
-       .bold = true,
-       .align = right ? Align::kRight : Align::kLeft,
-       .halo = 2});
+                                     : absl::StrFormat("%.0f m", away_m));
+  // Towards the middle of the frame, clear of the arrow.
+  PlaceLabel(text, {at.x + (dx > 0 ? -13 : 13), at.y + 4}, dx > 0, 12);
 }
 
 }  // namespace fathom::client::cli

@@ -5,6 +5,7 @@
 #define FATHOM_CLIENT_CLI_MAP_PANEL_H_
 
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "client/cli/canvas.h"
@@ -60,10 +61,16 @@ class MapPanel {
   // At the frame, an arrow to a contact that lies outside at `p`.
   void DrawContactOutside(const v1::ContactEstimate& contact, const Point& p);
 
+  // Writes a contact's name from `at`, or up to it with `ends_at`; inside the
+  // frame and on no other name.
+  void PlaceLabel(const std::string& text, Point at, bool ends_at, double size);
+
   Canvas& canvas_;
   const Region& region_;
   const Rectangle frame_;
   double meters_per_pixel_ = 0;
+  // Where names stand, by their baselines.
+  std::vector<Rectangle> labels_;
 };
 
 }  // namespace fathom::client::cli
