@@ -15,8 +15,8 @@ absl::Status ValidateForwardSonar(const ForwardSonarOptions& options) {
     return absl::InvalidArgumentError(absl::StrFormat(
         "beam_count=%d must be odd, 1 to 4095", fan.beam_count));
   }
-  if (!(fan.spacing_deg > 0.0) ||
-      !(fan.beam_count / 2 * fan.spacing_deg < 90.0)) {
+  const int outermost = fan.beam_count / 2;
+  if (!(fan.spacing_deg > 0.0) || !(outermost * fan.spacing_deg < 90.0)) {
     return absl::InvalidArgumentError(absl::StrFormat(
         "beam_count=%d beams spacing_deg=%g apart reach past the horizontal",
         fan.beam_count, fan.spacing_deg));

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 #include "absl/strings/str_format.h"
@@ -28,7 +29,7 @@ std::string FormatProgress(std::uint64_t done, std::uint64_t total,
   std::string eta = "-:--";
   if (rate > 0.0 && done <= total) {
     const long long rest_s =
-        static_cast<long long>(static_cast<double>(total - done) / rate + 0.5);
+        std::llround(static_cast<double>(total - done) / rate);
     eta = absl::StrFormat("%d:%02d", rest_s / 60, rest_s % 60);
   }
   return absl::StrFormat("[%s%s] %3.0f %%  %d/%d pings  %.0f/s  ETA %s  %s",

@@ -42,8 +42,9 @@ void AppendOpenPieces(const WaterGrid& water, bool legs_go_north,
     }
     inside = false;
   };
-  for (double along_m = step_m; along_m <= length_m - step_m;
-       along_m += step_m) {
+  const int steps = static_cast<int>(std::floor(length_m / step_m));
+  for (int i = 1; i < steps; ++i) {
+    const double along_m = i * step_m;
     if (!water.IsOpen(OnLeg(legs_go_north, along_m, across_m))) {
       close();
       continue;
