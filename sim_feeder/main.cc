@@ -189,8 +189,8 @@ void AddVehicleAndSonar(CLI::App& app, Scenario& scenario) {
 CLI::App* AddRun(CLI::App& app, RunOptions& run) {
   CLI::App* command =
       app.add_subcommand("run", "Survey an area and send what is heard");
-  command->add_option("--server", run.server,
-                      "host:port or unix:/path (without: no server)");
+  CLI::Option* server = command->add_option(
+      "--server", run.server, "host:port or unix:/path (without: no server)");
   command->add_option("--source", run.source_id, "Source id of all messages")
       ->capture_default_str();
   command->add_option("--epoch", run.epoch,
@@ -214,10 +214,14 @@ CLI::App* AddRun(CLI::App& app, RunOptions& run) {
       ->capture_default_str();
   AddVehicleAndSonar(*command, run.scenario);
   command->add_option("--track-out", run.track_out, "Write the track, CSV");
-  command->add_option("--pings-out", run.pings_out,
-                      "Without --server: write length-delimited pings");
-  command->add_option("--reports-out", run.reports_out,
-                      "Without --server: write length-delimited reports");
+  command
+      ->add_option("--pings-out", run.pings_out,
+                   "Without --server: write length-delimited pings")
+      ->excludes(server);
+  command
+      ->add_option("--reports-out", run.reports_out,
+                   "Without --server: write length-delimited reports")
+      ->excludes(server);
   command->add_flag("--progress", run.show_progress, "Show a progress bar");
   command->add_flag("--json", run.json, "Print the survey record, one line");
   return command;
