@@ -68,7 +68,7 @@ absl::Status RasterSource::ReadReference(GDALDataset& dataset,
     reference_ = *own;
   } else if (AxesAreDegrees(dataset)) {
     reference_.importFromEPSG(4326);
-    remarks.push_back(
+    remarks.emplace_back(
         "no coordinate reference system, but axes in degrees_east and "
         "degrees_north: taken as WGS 84");
   } else {
