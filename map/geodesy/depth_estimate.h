@@ -33,6 +33,15 @@ struct DepthEstimate {
   float shoalest_m = std::numeric_limits<float>::quiet_NaN();
   // Side of the cell that the estimate stands for.
   float cell_size_m = 0.0f;
+  // The part of std_m that is variability inside the cell (tau), 0..std_m:
+  // std_m^2 - variability_m^2 is the variance of the mean alone, and only that
+  // shrinks when independent evidence of the same cell is fused.
+  float variability_m = 0.0f;
+  // A point hazard: from this depth down to depth_m an obstacle narrower than
+  // the cell was sounded that the normal distribution above does not explain
+  // (a rock, a wreck, a wall). A vehicle at hazard_m or deeper is not free
+  // here whatever depth_m and std_m say. Less than depth_m; NaN: none known.
+  float hazard_m = std::numeric_limits<float>::quiet_NaN();
 };
 
 }  // namespace fathom::map
