@@ -33,16 +33,11 @@
 #include <array>
 #include <cstddef>
 
+#include "map/geodesy/depth_fusion.h"
 #include "map/local/evidence.h"
 #include "map/local/local_block.h"
 
 namespace fathom::map {
-
-// A mean and its variance; metres and m^2.
-struct MeanVariance {
-  double mean_m = 0.0;
-  double variance_m2 = 0.0;
-};
 
 // Depth change per metre that is assumed where no neighbour tells: 0.03 (1.7
 // degrees), the order of shelf and estuary floors.
@@ -71,21 +66,6 @@ double VariabilityInside(const Evidence& evidence,
 
 // Variance of the evidence's weighted mean: 1 / W + tau^2 / n.
 double MeanVarianceOf(const Evidence& evidence, double variability_m2);
-
-// The mean of `evidence` (variance `variance_m2` about the cell's mean)
-// together with the prior. `soundings` is how many made it.
-//
-// Let d be their distance. If d^2 is within what both variances explain, this
-// is 4.18 + 4.20. Else the prior's variance is widened to what would explain
-// d (its maximum-likelihood value d^2 - variance), which continues the former
-// without a step: the farther off the prior, the less it pulls. A prior 15 m
-// wrong then pulls two soundings of 0.5 m by 8 mm. A single sounding that
-// contradicts the prior beyond 3 sigma may itself be the error, so the
-// variance of "either one" (k (1 - k) d^2 with the unwidened k) is added until
-// a second one has come.
-// An infinite prior_variance_m2 means no prior.
-MeanVariance FusePrior(const MeanVariance& evidence, std::uint32_t soundings,
-                       double prior_mean_m, double prior_variance_m2);
 
 // The whole reading of a measured cell: mean and predictive variance. A prior
 // of kind kNone or kLand is left out. REQUIRES: cells[kCenter] not null and

@@ -32,29 +32,6 @@ absl::StatusOr<EstimatorKind> ParseEstimator(std::string_view name) {
       std::string(name)));
 }
 
-double Gain(double variance_1, double variance_2) {
-  if (std::isinf(variance_1)) return 1.0;
-  return variance_1 / (variance_1 + variance_2);
-}
-
-double FuseMean(double k, double mean_1, double mean_2) {
-  return (1.0 - k) * mean_1 + k * mean_2;
-}
-
-double CorrectMean(double k, double mean_1, double mean_2) {
-  return mean_1 + k * (mean_2 - mean_1);
-}
-
-double FuseVarianceKalman(double k, double variance_1) {
-  return (1.0 - k) * variance_1;
-}
-
-double FuseVarianceNervegna(double k, double variance_1, double mean_1,
-                            double mean_2) {
-  const double moved_m = mean_1 - mean_2;
-  return (1.0 - k) * variance_1 + k * moved_m * moved_m;
-}
-
 std::uint32_t SmoothReach(double distance_m, double cell_size_m) {
   return static_cast<std::uint32_t>(std::ceil(distance_m / cell_size_m));
 }

@@ -24,6 +24,7 @@
 #include <string_view>
 
 #include "absl/status/statusor.h"
+#include "map/geodesy/depth_fusion.h"  // IWYU pragma: export
 #include "map/local/placement.h"
 
 namespace fathom::map {
@@ -41,23 +42,8 @@ std::string_view EstimatorName(EstimatorKind kind);
 // The inverse. Errors: INVALID_ARGUMENT, listing the names.
 absl::StatusOr<EstimatorKind> ParseEstimator(std::string_view name);
 
-// Eq. 4.17: k = s1^2 / (s1^2 + s2^2), in [0, 1]. REQUIRES: both >= 0, not both
-// 0. An infinite variance_1 (nothing known before) gives 1.
-double Gain(double variance_1, double variance_2);
-
-// Eq. 4.18: (1 - k) mu1 + k mu2.
-double FuseMean(double k, double mean_1, double mean_2);
-
-// Eq. 4.19: mu1 + k (mu2 - mu1): the same number as 4.18, written as a
-// correction. The one the map computes with: exact where the means agree.
-double CorrectMean(double k, double mean_1, double mean_2);
-
-// Eq. 4.20 (4.15): (1 - k) s1^2 = k s2^2, the variance of the optimal mean.
-double FuseVarianceKalman(double k, double variance_1);
-
-// Eq. 4.21: (1 - k) s1^2 + k (mu1 - mu2)^2, the thesis's choice.
-double FuseVarianceNervegna(double k, double variance_1, double mean_1,
-                            double mean_2);
+// Gain, FuseMean, CorrectMean and FuseVariance* (eqs. 4.17 to 4.21) stand in
+// map/geodesy/depth_fusion.h, which this header includes.
 
 // Eq. 4.22: n = ceil(d / res), cells smoothed in each direction. REQUIRES:
 // distance_m >= 0, cell_size_m > 0.
