@@ -128,9 +128,11 @@ absl::Status CheckNumbers(std::int64_t application_id,
         "untouched: use a newer program",
         what, user_version, kSchemaVersion));
   }
-  if (user_version < 1) {
+  if (user_version < kOldestSchemaVersion) {
     return absl::FailedPreconditionError(absl::StrFormat(
-        "%s has format version %d, which never was", what, user_version));
+        "%s has format version %d, which was never released; this program "
+        "knows %d to %d: it was left untouched",
+        what, user_version, kOldestSchemaVersion, kSchemaVersion));
   }
   return absl::OkStatus();
 }

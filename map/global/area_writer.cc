@@ -22,7 +22,7 @@ AreaWriter::AreaWriter(const RootSquare& root, WorkTree& tree, int level,
       rule_(rule) {}
 
 void AreaWriter::WriteRange(const CellRange& range) {
-  const int tile_level = TileLevelFor(level_);
+  const int tile_level = tree_.ladder().TileLevelFor(level_);
   const int up = level_ - tile_level;
   for (std::uint32_t row = range.row_begin >> up; row <= range.row_last >> up;
        ++row) {

@@ -6,9 +6,12 @@
 // 2002, figs. 4-15 and 4-17), which is Z-order (Morton order) with the row's
 // bit above the column's.
 //
-// A tile is a piece of the quadtree of six levels: its root is a cell of level
-// 0, 6, 12 or 18 and it reaches down to 64 x 64 cells six levels below. A
-// position inside a tile is the 12-bit Z-order number of one of these.
+// A tile is a piece of the quadtree of six levels, down to 64 x 64 cells six
+// levels below its root. Tiles hang so that the deepest ones end at the map's
+// max_level: there nearly all leaves are, and a full tile is the cheapest. The
+// root tile spans what is left over, 1 to 6 levels (TileLadder). A position
+// inside a tile is the 12-bit Z-order number of one of its 64 x 64 places; the
+// root tile too is numbered so, though its leaves may end above the finest.
 //
 // Plain values and pure functions; thread-safe.
 
@@ -40,7 +43,7 @@ struct CellKey {
   friend auto operator<=>(const CellKey&, const CellKey&) = default;
 };
 
-// A tile, named by its root cell. REQUIRES: level is 0, 6, 12 or 18.
+// A tile, named by its root cell.
 struct TileKey {
   std::uint8_t level = 0;
   std::uint32_t row = 0;
@@ -51,15 +54,12 @@ struct TileKey {
   constexpr std::uint64_t Packed() const {
     return (std::uint64_t{level} << 48) | (std::uint64_t{row} << 24) | col;
   }
-  // The reverse. Any number gives a key; IsValid() says whether it is one.
+  // The reverse. Any number gives a key; TileLadder::Has says whether a map
+  // has it.
   static constexpr TileKey FromPacked(std::uint64_t packed) {
     return {.level = static_cast<std::uint8_t>(packed >> 48),
             .row = static_cast<std::uint32_t>((packed >> 24) & 0xffffff),
             .col = static_cast<std::uint32_t>(packed & 0xffffff)};
-  }
-  constexpr bool IsValid() const {
-    return level < kMaxLevel && level % kTileLevels == 0 &&
-           row < (1u << level) && col < (1u << level);
   }
   constexpr CellKey Root() const { return {level, row, col}; }
 
@@ -101,12 +101,38 @@ constexpr std::uint32_t SpanOf(int relative_level) {
   return 1u << (2 * (kTileLevels - relative_level));
 }
 
-// Level of the root of the tile that holds cells of `level` (0 for 0..6, 6 for
-// 7..12, and so on): a cell of a tile root's level is a slot of the parent
-// tile.
-constexpr int TileLevelFor(int level) {
-  return level == 0 ? 0 : (level - 1) / kTileLevels * kTileLevels;
-}
+// Where the tiles of a map hang: at level 0, and at max_level - 6, - 12, ... as
+// far as these are above 0. A map of max_level 13 has them at 0, 1 and 7; one
+// of 18 at 0, 6 and 12; one of 5 has the root tile alone. Never more than four.
+struct TileLadder {
+  constexpr explicit TileLadder(int its_max_level)
+      : max_level(its_max_level),
+        top_levels(its_max_level <= kTileLevels
+                       ? its_max_level
+                       : (its_max_level - 1) % kTileLevels + 1) {}
+
+  // Levels that the tile at `tile_level` spans: where its child tiles hang.
+  constexpr int LevelsOf(int tile_level) const {
+    return tile_level == 0 ? top_levels : kTileLevels;
+  }
+  // Level of the root of the tile that holds cells of `level`: a cell of a
+  // tile root's level is a slot of the parent tile.
+  constexpr int TileLevelFor(int level) const {
+    return level <= top_levels ? 0
+                               : top_levels + (level - top_levels - 1) /
+                                                  kTileLevels * kTileLevels;
+  }
+  // Whether a map may have this tile.
+  constexpr bool Has(const TileKey& key) const {
+    return (key.level == 0 || (key.level < max_level &&
+                               (max_level - key.level) % kTileLevels == 0)) &&
+           key.row < (1u << key.level) && key.col < (1u << key.level);
+  }
+
+  int max_level;
+  // 1 to 6; 0 if max_level is 0.
+  int top_levels;
+};
 
 // The cell that covers `position` of `tile`, `relative_level` below its root.
 constexpr CellKey CellInTile(const TileKey& tile, std::uint32_t position,
@@ -119,6 +145,7 @@ constexpr CellKey CellInTile(const TileKey& tile, std::uint32_t position,
 
 // The position in the tile `tile_level` on the way to `cell` at which the cell
 // begins, or at which the cell of level `tile_level + 6` that holds it lies.
+// (In the root tile a slot above that level may hold both.)
 constexpr std::uint32_t PositionInTile(const CellKey& cell, int tile_level) {
   const int finest = tile_level + kTileLevels;
   const std::uint32_t row = cell.level >= finest

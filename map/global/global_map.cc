@@ -28,7 +28,7 @@ absl::Status GlobalMapOptions::Validate() const {
 GlobalMap::GlobalMap(const GlobalMapOptions& options)
     : options_(options),
       tree_(std::make_unique<WorkTree>(
-          nullptr, options.max_cells,
+          nullptr, TileLadder(options.root.max_level()), options.max_cells,
           static_cast<float>(options.tolerance_m))) {}
 
 GlobalMap::GlobalMap(GlobalMap&&) noexcept = default;
@@ -83,7 +83,7 @@ absl::Status GlobalMap::FinishRestore() {
                                         ? std::uint8_t{0}
                                         : content.residual_codes[i]};
       if (leaves[i].std_code == kChildCode) {
-        const CellKey cell = CellInTile(key, position, kTileLevels);
+        const CellKey cell = CellInTile(key, position, content.levels[i]);
         const auto child = built.find(
             TileKey{.level = cell.level, .row = cell.row, .col = cell.col});
         if (child == built.end()) {
@@ -109,8 +109,8 @@ absl::Status GlobalMap::FinishRestore() {
         absl::StrFormat("tile level=%d row=%d col=%d hangs on no tile",
                         key.level, key.row, key.col));
   }
-  *tree_ = WorkTree(std::move(root->second), options_.max_cells,
-                    tree_->tolerance_m());
+  *tree_ = WorkTree(std::move(root->second), tree_->ladder(),
+                    options_.max_cells, tree_->tolerance_m());
   return absl::OkStatus();
 }
 

@@ -112,7 +112,7 @@ std::optional<DepthBounds> GlobalMapView::Bounds(const CellKey& cell) const {
     }
     const std::uint32_t begin = PositionInTile(cell, tile->key().level);
     const Tile::Found found = tile->Find(begin);
-    if (found.child != nullptr && below >= kTileLevels) {
+    if (found.child != nullptr && below >= found.level) {
       tile = found.child;
       continue;
     }

@@ -294,7 +294,8 @@ absl::StatusOr<GlobalMap::ImportSummary> GlobalMap::ImportRaster(
                  double{kMaxSamplesPerSide}));
   ChartRule rule(root, raster, block.replace);
   AreaWriter writer(root, *tree_, level, samples, rule);
-  VisitTouched(root, raster, CellKey{}, TileLevelFor(level), level,
+  VisitTouched(root, raster, CellKey{}, tree_->ladder().TileLevelFor(level),
+               level,
                [&](const CellRange& range) { writer.WriteRange(range); });
   const AreaCounts counts = writer.Finish();
   summary.leaves_written = counts.written;

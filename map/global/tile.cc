@@ -239,8 +239,8 @@ inline std::uint32_t Tile::TimeOf(const std::byte* record,
 Tile::Found Tile::Descend(const Tile& root, std::uint32_t row,
                           std::uint32_t col) {
   const Tile* tile = &root;
-  int shift = kMaxLevel - kTileLevels;
   for (;;) {
+    const int shift = kMaxLevel - kTileLevels - tile->key_.level;
     const std::uint32_t position =
         (std::uint32_t{kSpread[(row >> shift) & (kTileSide - 1)]} << 1) |
         kSpread[(col >> shift) & (kTileSide - 1)];
@@ -262,7 +262,6 @@ Tile::Found Tile::Descend(const Tile& root, std::uint32_t row,
       return found;
     }
     tile = tile->Children()[LoadAs<std::uint32_t>(record + 6)].get();
-    shift -= kTileLevels;
   }
 }
 
@@ -330,7 +329,9 @@ absl::Status ValidateContent(const TileKey& key, const TileContent& content,
     return absl::DataLossError(absl::StrFormat(
         "tile level=%d row=%d col=%d: %s", key.level, key.row, key.col, what));
   };
-  if (!key.IsValid() || (key.level > 0 && key.level >= max_level)) {
+  const TileLadder ladder(max_level);
+  const int span = ladder.LevelsOf(key.level);
+  if (!ladder.Has(key)) {
     return error(
         absl::StrFormat("no tile of a map of max_level=%d has this "
                         "key",
@@ -347,8 +348,8 @@ absl::Status ValidateContent(const TileKey& key, const TileContent& content,
   bool residual_seen = content.residual_codes.empty();
   for (std::size_t i = 0; i < slots; ++i) {
     const int level = content.levels[i];
-    if (level > kTileLevels || key.level + level > max_level ||
-        position >= kTileCells || position % SpanOf(level) != 0) {
+    if (level > span || position >= kTileCells ||
+        position % SpanOf(level) != 0) {
       return error(
           absl::StrFormat("slot %d of level %d does not fit", i, level));
     }
@@ -363,8 +364,7 @@ absl::Status ValidateContent(const TileKey& key, const TileContent& content,
       const bool child = code == kChildCode;
       if ((!child && code != 0) || std::bit_cast<std::uint32_t>(depth_m) != 0 ||
           content.times_s[i] != 0 || residual != 0 ||
-          (child &&
-           (level != kTileLevels || key.level + kTileLevels >= max_level))) {
+          (child && (level != span || key.level + span >= max_level))) {
         return error(
             absl::StrFormat("slot %d without a leaf is not canonical", i));
       }

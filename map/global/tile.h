@@ -19,8 +19,9 @@
 // bytes a leaf on its shape; no tile more than 1 byte (4 leaves a block), its
 // header of 100 bytes aside.
 //
-// A slot of the finest size may hold a whole tile in place of a leaf; so does
-// the tree reach from level 0 to 24 in four tiles. Tiles are shared between
+// A slot of the finest size that the tile spans (TileLadder::LevelsOf) may hold
+// a whole tile in place of a leaf; so does the tree reach from level 0 to 24 in
+// four tiles. Tiles are shared between
 // the writer and all views (shared_ptr: a tile lives as long as any of them
 // knows it), and two views that share a tile are equal there.
 //
@@ -55,7 +56,8 @@ struct TileContent {
   std::vector<std::uint8_t> levels;
   // Of a slot with a child tile and of an unknown leaf: 0.
   std::vector<float> depths_m;
-  // See leaf.h; kChildCode for a child tile (level 6 only), 0 for unknown.
+  // See leaf.h; kChildCode for a child tile (of the finest level that the tile
+  // spans), 0 for unknown.
   std::vector<std::uint16_t> std_codes;
   // Of a slot with a child tile and of an unknown leaf: 0.
   std::vector<std::uint32_t> times_s;

@@ -62,9 +62,9 @@ void WorkTile::RemoveChild(std::uint32_t start, const Leaf& leaf) {
   modified = true;
 }
 
-WorkTree::WorkTree(std::shared_ptr<const Tile> root_tile,
+WorkTree::WorkTree(std::shared_ptr<const Tile> root_tile, TileLadder ladder,
                    std::uint64_t max_cells, float tolerance_m)
-    : max_cells_(max_cells), tolerance_m_(tolerance_m) {
+    : ladder_(ladder), max_cells_(max_cells), tolerance_m_(tolerance_m) {
   if (root_tile == nullptr) {
     const std::uint8_t level = 0;
     const Leaf unknown;
@@ -97,7 +97,7 @@ WorkTile* WorkTree::OpenTile(const TileKey& key) {
 }
 
 WorkTile& WorkTree::DivideIntoChild(WorkTile& tile, std::uint32_t start) {
-  const CellKey cell = CellInTile(tile.key, start, kTileLevels);
+  const CellKey cell = CellInTile(tile.key, start, tile.levels[start]);
   WorkNode node;
   node.work = std::make_unique<WorkTile>(
       TileKey{.level = cell.level, .row = cell.row, .col = cell.col},

@@ -67,7 +67,8 @@ struct WorkTile {
   // Replaces all slots of the cell of `level` that begins at `start` by one
   // leaf. REQUIRES: none of them is a child.
   void Merge(std::uint32_t start, int level, const Leaf& leaf);
-  // Replaces the leaf (level 6) at `start` by a child tile.
+  // Replaces the leaf (of the finest level that the tile spans) at `start` by a
+  // child tile.
   void SetChild(std::uint32_t start, WorkNode child);
   // Replaces the child at `start` by a leaf.
   void RemoveChild(std::uint32_t start, const Leaf& leaf);
@@ -79,8 +80,10 @@ class WorkTree {
   static constexpr std::size_t kMaxOpenTiles = 1024;
 
   // REQUIRES: `root_tile` is a level 0 tile, or null: one unknown leaf.
-  WorkTree(std::shared_ptr<const Tile> root_tile, std::uint64_t max_cells,
-           float tolerance_m);
+  WorkTree(std::shared_ptr<const Tile> root_tile, TileLadder ladder,
+           std::uint64_t max_cells, float tolerance_m);
+
+  const TileLadder& ladder() const { return ladder_; }
 
   std::uint64_t leaf_count() const { return leaf_count_; }
   float tolerance_m() const { return tolerance_m_; }
@@ -134,6 +137,7 @@ class WorkTree {
   WorkTile& DivideIntoChild(WorkTile& tile, std::uint32_t start);
 
   WorkNode root_;
+  TileLadder ladder_;
   std::uint64_t max_cells_;
   float tolerance_m_;
   std::uint64_t leaf_count_ = 1;
@@ -149,7 +153,8 @@ WorkTree::Place WorkTree::Reach(const CellKey& cell, MayDivide may_divide) {
   for (;;) {
     tile->settled = false;
     const int below = cell.level - tile->key.level;
-    const int wanted = below < kTileLevels ? below : kTileLevels;
+    const int span = ladder_.LevelsOf(tile->key.level);
+    const int wanted = below < span ? below : span;
     const std::uint32_t position = PositionInTile(cell, tile->key.level);
     std::uint32_t start = tile->StartOf(position);
     while (tile->levels[position] < wanted) {
@@ -160,7 +165,7 @@ WorkTree::Place WorkTree::Reach(const CellKey& cell, MayDivide may_divide) {
       leaf_count_ += 3;
       start = tile->StartOf(position);
     }
-    if (below <= kTileLevels) {
+    if (below <= span) {
       return {.tile = tile, .start = start, .exact = true};
     }
     if (tile->leaves[start].std_code != kChildCode) {

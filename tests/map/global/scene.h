@@ -3,6 +3,7 @@
 #ifndef FATHOM_TESTS_MAP_GLOBAL_SCENE_H_
 #define FATHOM_TESTS_MAP_GLOBAL_SCENE_H_
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
@@ -56,6 +57,33 @@ inline RasterBlock FlatRaster(const GeodeticPoint& north_west, double step_deg,
   block.std_m = {std_m};
   block.time_s = 50;
   return block;
+}
+
+// A map of the given max_level in whose middle a square of `side_cells` finest
+// cells is surveyed: a gentle floor with ripples, so that no two depths are
+// alike, `seconds` different times. For counting bytes.
+inline GlobalMap SurveyedMap(int max_level, int side_cells,
+                             std::uint32_t seconds) {
+  // Cells of 10 m while the square stays within 1267 nmi, else finer.
+  const double side_m =
+      std::min(10.0 * std::ldexp(1.0, max_level), 1267 * 1852.0);
+  const double cell_m = SquareOf(side_m, side_m).cell_size_m(max_level);
+  GlobalMap map({.root = SquareOf(side_m, cell_m)});
+  const NedFrame frame(kNarragansett);
+  const double half_m = 0.5 * side_cells * cell_m;
+  map.MergeArea(
+      Rectangle(frame, -half_m, half_m, -half_m, half_m), cell_m,
+      [&](const GeodeticPoint& p) {
+        const NedPoint ned = frame.ToNed(p);
+        const double north = ned.north_m / cell_m;
+        const double east = ned.east_m / cell_m;
+        const auto time_s = static_cast<std::uint32_t>(
+            1'000'000 + std::abs(std::floor(7 * north) + std::floor(3 * east)));
+        return Measured(
+            static_cast<float>(30 + 0.02 * north + std::sin(0.7 * east)), 0.4f,
+            time_s % seconds + 1'000'000);
+      });
+  return map;
 }
 
 using Leaves = std::map<CellKey, Leaf>;
