@@ -134,8 +134,8 @@ absl::StatusOr<v1::ListContactsResponse> Client::ListContacts(
       options_.call_timeout);
 }
 
-absl::StatusOr<Region> Client::GetRegion(
-    const v1::GetRegionRequest& request) const {
+absl::StatusOr<Region> Client::GetRegion(const v1::GetRegionRequest& request,
+                                         const RegionProgress& progress) const {
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() +
                        options_.long_call_timeout);
@@ -143,7 +143,12 @@ absl::StatusOr<Region> Client::GetRegion(
   RegionAssembler assembler;
   v1::GetRegionResponse message;
   absl::Status fit;
-  while (fit.ok() && reader->Read(&message)) fit = assembler.Add(message);
+  while (fit.ok() && reader->Read(&message)) {
+    fit = assembler.Add(message);
+    if (fit.ok() && progress != nullptr) {
+      progress(assembler.cells_seen(), assembler.cells_total());
+    }
+  }
   if (!fit.ok()) context.TryCancel();
   const absl::Status end = FromGrpc(reader->Finish());
   FATHOM_RETURN_IF_ERROR(fit);

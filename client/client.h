@@ -34,6 +34,8 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -97,9 +99,15 @@ class Client {
   absl::StatusOr<v1::ListContactsResponse> ListContacts(
       const v1::ListContactsRequest& request) const;
 
-  // The area as one grid, put together from the server's tiles. Errors: also
-  // INTERNAL when tiles do not fit the grid that the server announced.
-  absl::StatusOr<Region> GetRegion(const v1::GetRegionRequest& request) const;
+  // The area as one grid, put together from the server's tiles. `progress`,
+  // if any, is told the cells that came and those of the whole after each
+  // message. Errors: also INTERNAL when tiles do not fit the grid that the
+  // server announced.
+  using RegionProgress =
+      std::function<void(std::uint64_t cells, std::uint64_t total)>;
+  absl::StatusOr<Region> GetRegion(
+      const v1::GetRegionRequest& request,
+      const RegionProgress& progress = nullptr) const;
 
   // A contact's estimates, oldest first. Errors: NOT_FOUND.
   absl::StatusOr<std::vector<v1::ContactEstimate>> GetContactHistory(

@@ -60,6 +60,10 @@ class RegionAssembler {
   // no message came, or the tiles do not cover the grid.
   absl::StatusOr<Region> Take();
 
+  // Cells that came, and those of the whole grid (0 before the first message).
+  std::uint64_t cells_seen() const { return cells_seen_; }
+  std::uint64_t cells_total() const { return region_.depth_m.size(); }
+
  private:
   Region region_;
   std::uint64_t cells_seen_ = 0;

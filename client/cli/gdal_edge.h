@@ -37,20 +37,24 @@ class GdalErrors {
   GdalErrors(const GdalErrors&) = delete;
   GdalErrors& operator=(const GdalErrors&) = delete;
 
-  // GDAL's words, or a general one where it gave none.
+  // GDAL's words on the last failure, else its last warning, else a general
+  // one.
   std::string message() const {
-    return message_.empty() ? "GDAL gives no reason" : message_;
+    if (!message_.empty()) return message_;
+    return warning_.empty() ? "GDAL gives no reason" : warning_;
   }
   bool failed() const { return !message_.empty(); }
 
  private:
   static void CPL_STDCALL Handle(CPLErr level, CPLErrorNum /*number*/,
                                  const char* text) {
-    if (level < CE_Failure) return;
-    static_cast<GdalErrors*>(CPLGetErrorHandlerUserData())->message_ = text;
+    auto* errors = static_cast<GdalErrors*>(CPLGetErrorHandlerUserData());
+    if (level == CE_Warning) errors->warning_ = text;
+    if (level >= CE_Failure) errors->message_ = text;
   }
 
   std::string message_;
+  std::string warning_;
 };
 
 }  // namespace fathom::client::cli

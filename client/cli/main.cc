@@ -23,6 +23,7 @@ Examples:
   fathom query --at 41.6,-71.4 --depth-m 20 --confidence 0.95
   fathom activity start bay --center 41.6,-71.4 --size-m 1000 --cell-m 10
   fathom contacts list --time +10min
+  fathom export --activity bay --out bay.tif
   fathom render --out map.png
   fathom VERB --help            every verb explains itself
 
@@ -79,6 +80,7 @@ int Main(int argc, char** argv) {
   AddQuery(app, session);
   AddContacts(app, session);
   AddPrior(app, session);
+  AddExport(app, session);
   AddRender(app, session);
   try {
     app.parse(argc, argv);

@@ -56,8 +56,11 @@ ProgressBar::ProgressBar(std::string label, std::string unit,
       start_(std::chrono::steady_clock::now()),
       next_draw_(start_) {}
 
-ProgressBar::~ProgressBar() {
+ProgressBar::~ProgressBar() { Finish(); }
+
+void ProgressBar::Finish() {
   if (drawn_) std::fputc('\n', stderr);
+  drawn_ = false;
 }
 
 void ProgressBar::Update(std::uint64_t done) {

@@ -26,6 +26,8 @@ class ProgressBar {
 
   // Draws at most ten times a second.
   void Update(std::uint64_t done);
+  // Ends the line before other text is written.
+  void Finish();
 
  private:
   const std::string label_;

@@ -45,6 +45,7 @@ class GdalDepthRaster final : public DepthRaster {
           "no part of it lies inside the mission's area"));
     }
     grid_ = *clipped;
+    land_has_zero_std_ = std_ && WrittenByUs();
     FATHOM_RETURN_IF_ERROR(DecidePositive());
     return absl::OkStatus();
   }
@@ -235,6 +236,7 @@ class GdalDepthRaster final : public DepthRaster {
       float std = options_.std_m.has_value()
                       ? static_cast<float>(*options_.std_m)
                       : kNan;
+      bool marked_land = false;
       if (Inside(x[i], y[i])) {
         const std::size_t at =
             static_cast<std::size_t>(static_cast<int>(y[i]) - window.row) *
@@ -244,8 +246,10 @@ class GdalDepthRaster final : public DepthRaster {
                                                    : depths.values[at];
         if (std_ && stds.values[at] > 0) std = stds.values[at];
         counts_.implausible += depths.implausible[at];
+        marked_land =
+            land_has_zero_std_ && std::isnan(depth) && stds.values[at] == 0;
       }
-      if (-depth > options_.land_above_m) {
+      if (marked_land || -depth > options_.land_above_m) {
         land[i] = 1;
         any_land = true;
         depth = kNan;
@@ -268,6 +272,15 @@ class GdalDepthRaster final : public DepthRaster {
     }
     if (any_land) tile.set_land(std::move(land));
     return tile;
+  }
+
+  // Whether `fathom export` wrote it, which marks land by an uncertainty of 0
+  // beside no depth (raster_writer.h).
+  bool WrittenByUs() {
+    if (dataset_->GetMetadataItem("FATHOM_LAND") != nullptr) return true;
+    char** xml = dataset_->GetMetadata("xml:BAG");
+    return xml != nullptr && xml[0] != nullptr &&
+           std::strstr(xml[0], "Fathom obstacle map") != nullptr;
   }
 
   bool Inside(double x, double y) const {
@@ -300,6 +313,7 @@ class GdalDepthRaster final : public DepthRaster {
   RasterCounts counts_;
   RasterBand depth_;
   RasterBand std_;  // None: options_.std_m for all.
+  bool land_has_zero_std_ = false;
   std::unique_ptr<RasterSource> source_;
   LonLatGrid grid_;
   std::uint64_t values_ = 0;

@@ -52,6 +52,7 @@ void AddActivity(CLI::App& app, Session& session);
 void AddQuery(CLI::App& app, Session& session);
 void AddContacts(CLI::App& app, Session& session);
 void AddPrior(CLI::App& app, Session& session);
+void AddExport(CLI::App& app, Session& session);
 void AddRender(CLI::App& app, Session& session);
 
 }  // namespace fathom::client::cli

@@ -79,7 +79,8 @@ TEST_F(CliTest, EveryVerbPrintsOneJsonDocumentAlsoForErrors) {
         "activity complete a", "activity transfer a",
         "query --at 1,2 --depth-m 3", "contacts list", "contacts history s/c",
         "contacts report s/c --at 1,2", "contacts drop s/c",
-        "prior import /nonexistent --std-m 1", "render --out /dev/null"}) {
+        "prior import /nonexistent --std-m 1", "render --out /dev/null",
+        "export --out /dev/null"}) {
     const Outcome outcome = Run(std::string("--json ") + verb);
     EXPECT_TRUE(nlohmann::json::accept(outcome.out)) << verb << outcome.out;
     // What failed says so in both.
@@ -127,7 +128,8 @@ TEST_F(CliTest, UsageIsOneAndNothingIsSent) {
        {"", "frobnicate", "query", "query --at 91,0 --depth-m 1",
         "query --at 1,2", "query --at 1,2 --depth-m x",
         "query --at 1,2 --depth-m 3 --time yesterday",
-        "activity start a --size-m 5", "contacts drop nameless"}) {
+        "activity start a --size-m 5", "contacts drop nameless", "export",
+        "export -o x --bands salt", "export -o x --format png"}) {
     EXPECT_EQ(Run(wrong).code, 1) << wrong;
   }
   EXPECT_EQ(server_.calls("QueryObstacle"), 0);
@@ -155,7 +157,7 @@ TEST_F(CliTest, HelpTeachesWithExamplesAndExitCodes) {
     EXPECT_THAT(help.out, HasSubstr(wanted));
   }
   for (const char* verb :
-       {"query", "activity start", "prior import", "render"}) {
+       {"query", "activity start", "prior import", "export", "render"}) {
     const Outcome verb_help = Run(std::string(verb) + " --help");
     EXPECT_EQ(verb_help.code, 0);
     EXPECT_THAT(verb_help.out, HasSubstr("Example")) << verb;
