@@ -1,5 +1,6 @@
 #include "server/convert_mission.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <string>
@@ -257,6 +258,15 @@ absl::StatusOr<ChartHeader> ConvertHeader(const v1::PriorHeader& header,
                                   .count());
   }
   result.replace = header.replace();
+  if (!header.import_id().empty()) {
+    FATHOM_RETURN_IF_ERROR(
+        CheckId(header.import_id(), FieldPath(path, "import_id")));
+    result.import_id = header.import_id();
+  } else if (header.first_tile() > 1) {
+    return InvalidField(FieldPath(path, "first_tile").ToString(),
+                        "an import without import_id starts with tile 1");
+  }
+  result.first_tile = std::max<uint64_t>(header.first_tile(), 1);
   return result;
 }
 

@@ -29,6 +29,10 @@ struct ChartHeader {
   std::string name;
   uint32_t time_s = 0;
   bool replace = false;
+  // Empty: not remembered.
+  std::string import_id = {};
+  // Number of the first tile, >= 1.
+  uint64_t first_tile = 1;
 };
 absl::StatusOr<ChartHeader> ConvertHeader(const v1::PriorHeader& header,
                                           const FieldPath& path);

@@ -28,9 +28,9 @@ void ImportCall::OnReadDone(bool ok) {
     if (!header_.has_value()) {
       Fail(HeaderMissing());
     } else if (!held_.has_value()) {
-      // A chart without tiles changes nothing.
-      response_->set_map_revision(context_.keeper.View()->revision());
-      Finish(grpc::Status::OK);
+      // A chart without tiles changes nothing; a resumed one that was complete
+      // is made durable.
+      FinishWithoutTiles();
     } else {
       Import(*std::exchange(held_, std::nullopt), /*last=*/true);
     }
@@ -74,19 +74,25 @@ absl::Status ImportCall::TakeRequest() {
 
 void ImportCall::Import(map::RasterBlock block, bool last) {
   auto done = [call = shared_from_this(),
-               last](absl::StatusOr<Applied<map::ImportResult>> applied) {
+               last](absl::StatusOr<Applied<ImportedTile>> applied) {
     call->context_.courier.Give([call, last, applied = std::move(applied)] {
       if (!applied.ok()) {
         call->Fail(KeeperError(call->context_, applied.status()));
         return;
       }
-      const map::ImportResult& result = applied->result;
+      const map::ImportResult& result = applied->result.result;
       v1::ImportPriorResponse* const response = call->response_;
-      if (!call->any_applied_) {
-        response->set_leaves_before(result.leaves_before);
-      }
-      call->any_applied_ = true;
       response->set_tiles(response->tiles() + 1);
+      response->set_map_revision(applied->revision);
+      if (applied->result.skipped) {
+        response->set_tiles_skipped(response->tiles_skipped() + 1);
+      } else {
+        if (!call->any_applied_) {
+          response->set_leaves_before(result.leaves_before);
+        }
+        call->any_applied_ = true;
+        response->set_leaves_after(result.leaves_after);
+      }
       response->set_cells_with_depth(response->cells_with_depth() +
                                      result.cells_with_depth);
       response->set_cells_land(response->cells_land() + result.cells_land);
@@ -94,18 +100,35 @@ void ImportCall::Import(map::RasterBlock block, bool last) {
                                   result.cells_unknown);
       response->set_cells_outside(response->cells_outside() +
                                   result.cells_outside);
-      response->set_leaves_after(result.leaves_after);
-      response->set_map_revision(applied->revision);
       if (!last) {
         call->StartRead(&call->request_);
         return;
       }
-      Log(LogLevel::kInfo, "chart imported name=%s tiles=%d leaves=%d",
-          call->header_->name, response->tiles(), response->leaves_after());
+      Log(LogLevel::kInfo,
+          "chart imported name=%s import_id=%s tiles=%d skipped=%d leaves=%d",
+          call->header_->name, call->header_->import_id, response->tiles(),
+          response->tiles_skipped(), response->leaves_after());
       call->Finish(grpc::Status::OK);
     });
   };
-  context_.keeper.Import(std::move(block), last, std::move(done));
+  const uint64_t number = header_->first_tile + tiles_++;
+  context_.keeper.Import(std::move(block), last,
+                         {.import_id = header_->import_id, .number = number},
+                         std::move(done));
+}
+
+void ImportCall::FinishWithoutTiles() {
+  context_.keeper.Checkpoint([call = shared_from_this()](
+                                 const absl::StatusOr<Applied<Nothing>>& done) {
+    call->context_.courier.Give([call, done] {
+      if (!done.ok()) {
+        call->Fail(KeeperError(call->context_, done.status()));
+        return;
+      }
+      call->response_->set_map_revision(done->revision);
+      call->Finish(grpc::Status::OK);
+    });
+  });
 }
 
 void ImportCall::Fail(const absl::Status& status) {

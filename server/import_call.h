@@ -4,7 +4,8 @@
 // until the client has ended, because with it the import becomes durable.
 //
 // A broken-off import leaves the tiles that were taken in the map (and makes
-// them durable): repeat it with `replace`.
+// them durable): with an import_id it may be repeated or resumed, each tile
+// counts once; without one, repeat it with `replace`.
 //
 // Reactions and the keeper's answers alternate, so the state needs no mutex:
 // at any time either a read or a command is under way.
@@ -48,6 +49,7 @@ class ImportCall final : public grpc::ServerReadReactor<v1::ImportPriorRequest>,
   absl::Status TakeRequest();
   // Hands `block` to the map; then reads on, or finishes after the last.
   void Import(map::RasterBlock block, bool last);
+  void FinishWithoutTiles();
   void Fail(const absl::Status& status);
 
   ServerContext& context_;
@@ -55,6 +57,7 @@ class ImportCall final : public grpc::ServerReadReactor<v1::ImportPriorRequest>,
   v1::ImportPriorRequest request_;
   std::optional<ChartHeader> header_;
   std::optional<map::RasterBlock> held_;
+  // Tiles handed to the map.
   uint64_t tiles_ = 0;
   uint64_t cells_ = 0;
   bool any_applied_ = false;

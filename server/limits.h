@@ -43,6 +43,10 @@ inline constexpr size_t kMaxTileCells = 512 * 512;
 // bounded by max_cells; this bounds the time a stream may take.
 inline constexpr uint64_t kMaxImportCells = 256'000'000;
 
+// Chart cells after which an import under way is made durable, so that a crash
+// costs the client at most so many again: about a second of checkpoint.
+inline constexpr uint64_t kImportCheckpointCells = 4'000'000;
+
 // Most cells in a GetRegion answer: 4096 x 4096, 270 MB on the wire.
 inline constexpr uint64_t kMaxRegionCells = 16'777'216;
 

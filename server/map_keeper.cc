@@ -197,7 +197,7 @@ void MapKeeper::CompleteActivity(map::ActivityId id, bool discard,
           [this, id = std::move(id),
            discard](StorageItem& item) -> absl::StatusOr<map::TransferResult> {
             auto result = map_->Complete(id, discard);
-            if (result.ok()) item.checkpoint = Publish();
+            if (result.ok()) SaveAll(Publish(), item);
             return result;
           });
 }
@@ -207,7 +207,7 @@ void MapKeeper::Transfer(map::ActivityId id, Done<map::TransferResult> done) {
           [this, id = std::move(id)](
               StorageItem& item) -> absl::StatusOr<map::TransferResult> {
             auto result = map_->Transfer(id);
-            if (result.ok()) item.checkpoint = Publish();
+            if (result.ok()) SaveAll(Publish(), item);
             return result;
           });
 }
@@ -224,24 +224,29 @@ void MapKeeper::DropContact(map::DropContact event, Done<Nothing> done) {
       });
 }
 
-void MapKeeper::Import(map::RasterBlock block, bool last,
-                       Done<map::ImportResult> done) {
+void MapKeeper::Import(map::RasterBlock block, bool last, ImportTile tile,
+                       Done<ImportedTile> done) {
   // Shared, because std::function copies and a block holds megabytes.
   auto shared = std::make_shared<const map::RasterBlock>(std::move(block));
   Enqueue(std::move(done),
-          [this, shared,
-           last](StorageItem& item) -> absl::StatusOr<map::ImportResult> {
-            auto result = map_->Import(*shared, last);
-            if (result.ok() && last) item.checkpoint = Publish();
-            item.done_when_applied = !last;
-            return result;
+          [this, shared, last, tile = std::move(tile)](StorageItem& item) {
+            return ApplyImport(*shared, last, tile, item);
+          });
+}
+
+void MapKeeper::FindImport(std::string import_id, Done<uint64_t> done) {
+  Enqueue(std::move(done),
+          [this, import_id = std::move(import_id)](
+              StorageItem& item) -> absl::StatusOr<uint64_t> {
+            item.done_when_applied = true;
+            return ledger_.Newest(StreamKind::kImports, {import_id}).sequence;
           });
 }
 
 void MapKeeper::Checkpoint(Done<Nothing> done) {
   Enqueue(std::move(done),
           [this](StorageItem& item) -> absl::StatusOr<Nothing> {
-            item.checkpoint = Publish();
+            SaveAll(Publish(), item);
             return Nothing{};
           });
 }
@@ -267,6 +272,7 @@ void MapKeeper::RunMapper() {
     std::vector<StorageItem> items;
     items.reserve(commands.size() + 1);
     size_t refused_commands = 0;
+    bool any_record = false;
     for (Command& command : commands) {
       StorageItem item;
       if (auto* ingest = std::get_if<IngestCommand>(&command)) {
@@ -284,7 +290,10 @@ void MapKeeper::RunMapper() {
         continue;
       }
       item.revision = map_->revision();
-      if (item.record.has_value()) records_since_checkpoint_ += 1;
+      if (item.record.has_value()) {
+        records_since_checkpoint_ += 1;
+        any_record = true;
+      }
       if (item.checkpoint != nullptr) {
         records_since_checkpoint_ = 0;
         checkpoint_revision_ = item.checkpoint->revision();
@@ -293,9 +302,14 @@ void MapKeeper::RunMapper() {
     }
     commands.clear();
     const ViewPtr view = Publish();
-    if (records_since_checkpoint_ >= options_.journal_max_records) {
+    // A ping's prior may have been read from tiles that no checkpoint holds:
+    // replayed without them it would give another map. So what is journalled
+    // beside such tiles is committed in one transaction with them.
+    const bool tiles_unsaved = unsaved_import_cells_ > 0 && any_record;
+    if (tiles_unsaved ||
+        records_since_checkpoint_ >= options_.journal_max_records) {
       StorageItem item;
-      item.checkpoint = view;
+      SaveAll(view, item);
       item.revision = view->revision();
       items.push_back(std::move(item));
       records_since_checkpoint_ = 0;
@@ -317,7 +331,7 @@ void MapKeeper::RunMapper() {
   if (map_->revision() != checkpoint_revision_) {
     // A snapshot at the end makes the next start quick.
     StorageItem& item = last.emplace_back();
-    item.checkpoint = Publish();
+    SaveAll(Publish(), item);
     item.revision = map_->revision();
   }
   HandToStorage(std::move(last), /*last=*/true);
@@ -415,6 +429,54 @@ MapKeeper::ViewPtr MapKeeper::Publish() {
   // `replaced` may be the last reference to old pieces: freed here, outside
   // the lock.
   return view;
+}
+
+void MapKeeper::SaveAll(ViewPtr view, StorageItem& item) {
+  item.checkpoint = std::move(view);
+  for (const auto& [import_id, number] : unsaved_imports_) {
+    item.import_positions.push_back({.stream = StreamKind::kImports,
+                                     .source = {import_id},
+                                     .epoch = 1,
+                                     .sequence = number});
+  }
+  unsaved_imports_.clear();
+  unsaved_import_cells_ = 0;
+}
+
+absl::StatusOr<ImportedTile> MapKeeper::ApplyImport(
+    const map::RasterBlock& block, bool last, const ImportTile& tile,
+    StorageItem& item) {
+  ImportedTile imported;
+  const map::SourceId source{tile.import_id};
+  const bool remembered = !tile.import_id.empty();
+  if (remembered) {
+    const uint64_t held = ledger_.Newest(StreamKind::kImports, source).sequence;
+    if (tile.number > held + 1) {
+      return absl::FailedPreconditionError(absl::StrFormat(
+          "tile %d of import_id=%s follows tile %d: send the tiles between, or "
+          "resume with first_tile=%d",
+          tile.number, tile.import_id, held, held + 1));
+    }
+    if (!ledger_.HasRoomFor(StreamKind::kImports, source)) {
+      return absl::ResourceExhaustedError(
+          "the mission has taken in as many sources and imports as it can");
+    }
+    imported.skipped = tile.number <= held;
+  }
+  if (!imported.skipped) {
+    FATHOM_ASSIGN_OR_RETURN(imported.result, map_->Import(block, last));
+    unsaved_import_cells_ += block.depth_m.size();
+    if (remembered) {
+      ledger_.Take(StreamKind::kImports, source, {1, tile.number});
+      unsaved_imports_[tile.import_id] = tile.number;
+    }
+  }
+  if (last || unsaved_import_cells_ >= kImportCheckpointCells) {
+    SaveAll(Publish(), item);
+  } else {
+    item.done_when_applied = true;
+  }
+  return imported;
 }
 
 void MapKeeper::HandToStorage(std::vector<StorageItem> items, bool last) {

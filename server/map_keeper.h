@@ -30,6 +30,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -83,6 +84,20 @@ using Done = std::function<void(absl::StatusOr<Applied<Result>>)>;
 
 // For commands whose only result is the revision.
 struct Nothing {};
+
+// Which tile of which import a block is. Tiles of an id count from 1 and are
+// taken in order, each once. An empty id: not remembered.
+struct ImportTile {
+  std::string import_id;
+  uint64_t number = 0;
+};
+
+// What became of a tile. Skipped: the map held it already; nothing changed, all
+// counts are 0.
+struct ImportedTile {
+  map::ImportResult result;
+  bool skipped = false;
+};
 
 // State of the way to the disk.
 struct StorageState {
@@ -153,9 +168,16 @@ class MapKeeper {
                         Done<map::TransferResult> done);
   void Transfer(map::ActivityId id, Done<map::TransferResult> done);
   void DropContact(map::DropContact event, Done<Nothing> done);
-  // One block of a chart. Only the `last` is durable when `done` runs, and
-  // with it all before it; the others tell when they are applied.
-  void Import(map::RasterBlock block, bool last, Done<map::ImportResult> done);
+  // One block of a chart. When the `last` is done it and all before it are
+  // durable; the others tell when they are applied, but every
+  // kImportCheckpointCells they wait for the disk too. The number of the tile
+  // becomes durable in one transaction with it. Errors: FAILED_PRECONDITION
+  // (tiles of the id before this one are missing), RESOURCE_EXHAUSTED (too many
+  // ids).
+  void Import(map::RasterBlock block, bool last, ImportTile tile,
+              Done<ImportedTile> done);
+  // The number of the import's last tile in the map; 0 if it has none.
+  void FindImport(std::string import_id, Done<uint64_t> done);
   // Makes durable what a broken-off import has left in the map.
   void Checkpoint(Done<Nothing> done);
 
@@ -176,8 +198,9 @@ class MapKeeper {
     std::optional<storage::JournalRecord> record;
     std::optional<map::ContactEstimate> contact_estimate;
     std::optional<storage::SourcePosition> position;
-    // Set: this view is to be saved whole.
+    // Set: this view is to be saved whole, and with it how far imports got.
     ViewPtr checkpoint;
+    std::vector<storage::SourcePosition> import_positions;
     // Revision of the map behind it.
     uint64_t revision = 0;
     // Of an ingest message: whom to tell, and what it took of the bound.
@@ -222,6 +245,12 @@ class MapKeeper {
                     StorageItem& item);
   // Publishes the map as it is now.
   ViewPtr Publish();
+  // The item will save `view`, which is the map as it is now, and all that must
+  // be saved with it.
+  void SaveAll(ViewPtr view, StorageItem& item);
+  absl::StatusOr<ImportedTile> ApplyImport(const map::RasterBlock& block,
+                                           bool last, const ImportTile& tile,
+                                           StorageItem& item);
   void HandToStorage(std::vector<StorageItem> items, bool last);
 
   // The storage thread.
@@ -244,6 +273,10 @@ class MapKeeper {
   std::unique_ptr<map::ObstacleMap> map_;
   SourceLedger ledger_;
   size_t records_since_checkpoint_ = 0;
+  // Of tiles that no checkpoint holds yet: the last number of each import, and
+  // their cells.
+  std::map<std::string, uint64_t> unsaved_imports_;
+  uint64_t unsaved_import_cells_ = 0;
   uint64_t checkpoint_revision_ = 0;
 
   // ---- Storage thread only (and the constructor). ----

@@ -76,6 +76,9 @@ absl::Status MapKeeper::CommitItems(std::vector<StorageItem>& items) {
       if (item.position.has_value()) {
         batch.source_positions.push_back(*std::move(item.position));
       }
+      for (storage::SourcePosition& position : item.import_positions) {
+        batch.source_positions.push_back(std::move(position));
+      }
       checkpoint = item.checkpoint;
     }
     if (checkpoint != nullptr) {

@@ -110,6 +110,23 @@ grpc::ServerReadReactor<v1::ImportPriorRequest>* MissionService::ImportPrior(
   return ImportCall::Start(context_, response);
 }
 
+grpc::ServerUnaryReactor* MissionService::GetImport(
+    grpc::CallbackServerContext* call, const v1::GetImportRequest* request,
+    v1::GetImportResponse* response) {
+  const FieldPath root;
+  const absl::Status checked =
+      CheckId(request->import_id(), FieldPath(root, "import_id"));
+  if (!checked.ok()) return Reply(call, checked);
+  grpc::ServerUnaryReactor* reactor = call->DefaultReactor();
+  context_.keeper.FindImport(
+      request->import_id(),
+      Answer<uint64_t>(context_, reactor,
+                       [response](const Applied<uint64_t>& applied) {
+                         response->set_tiles(applied.result);
+                       }));
+  return reactor;
+}
+
 grpc::ServerUnaryReactor* MissionService::GetMissionStatus(
     grpc::CallbackServerContext* call,
     const v1::GetMissionStatusRequest* request,

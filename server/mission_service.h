@@ -31,6 +31,9 @@ class MissionService final : public v1::MissionService::CallbackService {
   grpc::ServerReadReactor<v1::ImportPriorRequest>* ImportPrior(
       grpc::CallbackServerContext* call,
       v1::ImportPriorResponse* response) override;
+  grpc::ServerUnaryReactor* GetImport(grpc::CallbackServerContext* call,
+                                      const v1::GetImportRequest* request,
+                                      v1::GetImportResponse* response) override;
   grpc::ServerUnaryReactor* GetMissionStatus(
       grpc::CallbackServerContext* call,
       const v1::GetMissionStatusRequest* request,

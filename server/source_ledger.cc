@@ -23,6 +23,18 @@ Judgement SourceLedger::Take(StreamKind kind, const map::SourceId& source,
   return judgement;
 }
 
+MessageNumber SourceLedger::Newest(StreamKind kind,
+                                   const map::SourceId& source) const {
+  const auto found = positions_.find(Key(kind, source));
+  return found == positions_.end() ? MessageNumber{} : found->second;
+}
+
+bool SourceLedger::HasRoomFor(StreamKind kind,
+                              const map::SourceId& source) const {
+  return positions_.size() < kMaxSources ||
+         positions_.contains(Key(kind, source));
+}
+
 void SourceLedger::Restore(StreamKind kind, const map::SourceId& source,
                            MessageNumber number) {
   positions_[Key(kind, source)] = number;

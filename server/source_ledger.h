@@ -21,7 +21,7 @@
 
 namespace fathom::server {
 
-// The two streams of a source; each is numbered by itself.
+// The streams of a source; each is numbered by itself.
 using storage::StreamKind;
 
 // A message's number.
@@ -65,6 +65,12 @@ class SourceLedger {
   // Judges the message and, if it is new, notes it as taken. O(log sources).
   Judgement Take(StreamKind kind, const map::SourceId& source,
                  MessageNumber number);
+
+  // The newest number taken; {0, 0} of a source never heard of.
+  MessageNumber Newest(StreamKind kind, const map::SourceId& source) const;
+
+  // Whether the source is known, or there is room for one more.
+  bool HasRoomFor(StreamKind kind, const map::SourceId& source) const;
 
   // Sets a position as stored in the mission file.
   void Restore(StreamKind kind, const map::SourceId& source,

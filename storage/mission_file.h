@@ -42,9 +42,9 @@ namespace fathom::storage {
 inline constexpr std::int32_t kApplicationId = 0x4674686D;
 
 // The user_version that this program writes, and the oldest that it reads.
-// 1 hung tiles at other levels and was never released.
-inline constexpr int kSchemaVersion = 2;
-inline constexpr int kOldestSchemaVersion = 2;
+// Older ones were never released.
+inline constexpr int kSchemaVersion = 3;
+inline constexpr int kOldestSchemaVersion = 3;
 
 // Size of the write-ahead log beyond which Commit copies it into the file
 // after its fsync. Big enough that the copy is rare beside the commits (a

@@ -61,12 +61,18 @@ struct MissionMetadata {
 // Bytes of the texts in MissionMetadata, at most.
 inline constexpr std::size_t kMaxNameBytes = 1024;
 
-// The two kinds of numbered messages; each source counts them apart. Stored:
-// never reuse a number.
-enum class StreamKind : std::uint8_t { kPings = 1, kContacts = 2 };
+// The kinds of numbered messages; each source counts them apart. In kImports
+// the source is an import's id, the epoch 1, the sequence the number of its
+// last tile in the map. Stored: never reuse a number.
+enum class StreamKind : std::uint8_t {
+  kPings = 1,
+  kContacts = 2,
+  kImports = 3
+};
 
 // The last message of a source that is in the file (applied or refused for
-// good): everything up to it in its epoch is a resend.
+// good): everything up to it in its epoch is a resend. That of an import is
+// committed with the checkpoint that holds its tiles, never before.
 struct SourcePosition {
   StreamKind stream = StreamKind::kPings;
   map::SourceId source;

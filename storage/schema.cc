@@ -80,7 +80,7 @@ CREATE TABLE contact_history (
 ) STRICT, WITHOUT ROWID;
 
 CREATE TABLE source_position (
-  stream INTEGER NOT NULL CHECK (stream IN (1, 2)),
+  stream INTEGER NOT NULL CHECK (stream IN (1, 2, 3)),
   source_id TEXT NOT NULL,
   epoch INTEGER NOT NULL,
   sequence INTEGER NOT NULL,

@@ -45,8 +45,8 @@ class KeeperFileTest : public ::testing::Test {
 
   // Something of everything; what it leaves open is in the journal.
   void Fill(MapKeeper& keeper) {
-    Awaited<map::ImportResult> imported;
-    keeper.Import(SampleChart(), /*last=*/true, imported.Done());
+    Awaited<ImportedTile> imported;
+    keeper.Import(SampleChart(), /*last=*/true, {}, imported.Done());
     ASSERT_THAT(imported.Await(), IsOk());
     Awaited<Nothing> started;
     keeper.StartActivity(Leg(), started.Done());

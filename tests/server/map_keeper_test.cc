@@ -230,16 +230,16 @@ TEST_F(MapKeeperTest, ATransferIsDurableByACheckpoint) {
 
 TEST_F(MapKeeperTest, OnlyTheLastBlockOfAChartWaitsForTheDisk) {
   store_.Hold();
-  Awaited<map::ImportResult> first;
-  keeper_->Import(SampleChart(), /*last=*/false, first.Done());
+  Awaited<ImportedTile> first;
+  keeper_->Import(SampleChart(), /*last=*/false, {}, first.Done());
   EXPECT_THAT(first.Await(), IsOk());
-  Awaited<map::ImportResult> last;
-  keeper_->Import(SampleChart(), /*last=*/true, last.Done());
+  Awaited<ImportedTile> last;
+  keeper_->Import(SampleChart(), /*last=*/true, {}, last.Done());
   store_.AwaitAttempts(1);
   EXPECT_EQ(last.times_told(), 0U);
   store_.Release();
   FATHOM_ASSERT_OK_AND_ASSIGN(const auto applied, last.Await());
-  EXPECT_EQ(applied.result.cells_with_depth, 100U);
+  EXPECT_EQ(applied.result.result.cells_with_depth, 100U);
   EXPECT_TRUE(store_.seen().back().checkpoint);
 }
 
