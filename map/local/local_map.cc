@@ -50,6 +50,19 @@ std::optional<RejectReason> Threshold(const Beam& beam,
   return std::nullopt;
 }
 
+// Whether Threshold passes the beam, in one test without branches; NaN fails
+// it.
+bool Passes(const Beam& beam, const LocalMapOptions& options) {
+  return static_cast<int>(beam.range_m > options.min_range_m) &
+         static_cast<int>(beam.range_m < options.max_range_m) &
+         static_cast<int>(beam.std_m > 0.0f) &
+         static_cast<int>(beam.std_m <= kMaxStdM) &
+         static_cast<int>(beam.depth_m >= kMinDepthM) &
+         static_cast<int>(beam.depth_m <= kMaxDepthM) &
+         static_cast<int>(std::fabs(beam.bearing_rad) <
+                          std::numeric_limits<float>::infinity());
+}
+
 // A prior that may stand in the map: known, finite, a std above 0.
 CellPrior ToCellPrior(const std::optional<DepthEstimate>& estimate) {
   if (!estimate.has_value() || estimate->kind == EvidenceKind::kNone) return {};
@@ -117,8 +130,9 @@ struct LocalMap::State {
   LocalBlock& MutableBlock(BlockIndex index, const PriorSource& prior);
   void FillPrior(BlockIndex index, const PriorSource& prior,
                  LocalBlock& block) const;
+  // `block`: the cell's, mutable.
   void AddSounding(CellIndex cell, const Beam& beam, std::uint32_t time_s,
-                   const PriorSource& prior);
+                   const PriorSource& prior, LocalBlock& block);
   void Smooth(CellIndex cell, const NervegnaCell& updated, std::uint32_t time_s,
               const PriorSource& prior);
 
@@ -180,8 +194,7 @@ LocalBlock& LocalMap::State::MutableBlock(BlockIndex index,
 
 void LocalMap::State::AddSounding(CellIndex cell, const Beam& beam,
                                   std::uint32_t time_s,
-                                  const PriorSource& prior) {
-  LocalBlock& block = MutableBlock(LocalGrid::BlockOf(cell), prior);
+                                  const PriorSource& prior, LocalBlock& block) {
   const std::size_t k = LocalGrid::OffsetOf(cell);
   Evidence& evidence = block.evidence[k];
   evidence.Add(beam.depth_m, beam.std_m, time_s);
@@ -260,10 +273,16 @@ LocalMap::UpdateResult LocalMap::Update(const Ping& ping,
       std::remainder(ping.pose.heading_deg, 360.0) * kRadPerDeg +
       grid.frame.NorthAzimuthRad(ping.pose.position);
   const std::uint32_t time_s = ToUnixSeconds(ping.time);
+  // Neighbouring beams fall in few blocks: each is looked up once in a row.
+  // It stays where it is while this view's epoch lasts.
+  LocalBlock* block = nullptr;
+  BlockIndex block_index;
   for (const Beam& beam : ping.beams) {
-    if (const std::optional<RejectReason> bad = Threshold(beam, grid.options)) {
-      result.rejects.Add(*bad);
-      continue;
+    if (!Passes(beam, grid.options)) {
+      if (const auto bad = Threshold(beam, grid.options)) {
+        result.rejects.Add(*bad);
+        continue;
+      }
     }
     const NedPoint obstacle = ObstaclePosition(
         vehicle, BeamOffset(beam.range_m,
@@ -273,7 +292,12 @@ LocalMap::UpdateResult LocalMap::Update(const Ping& ping,
       result.rejects.Add(RejectReason::kOutsideArea);
       continue;
     }
-    state_->AddSounding(cell, beam, time_s, prior);
+    const BlockIndex index = LocalGrid::BlockOf(cell);
+    if (block == nullptr || index != block_index) {
+      block = &state_->MutableBlock(index, prior);
+      block_index = index;
+    }
+    state_->AddSounding(cell, beam, time_s, prior, *block);
     ++result.accepted;
   }
   return result;
