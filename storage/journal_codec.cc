@@ -33,9 +33,6 @@ static_assert(sizeof(map::Beam) == 16);
 constexpr std::size_t kMaxRowBytes = 4 * kMaxStringBytes;
 constexpr std::size_t kMaxSegmentRowBytes = 64 << 20;
 
-// A segment ends behind the ping that fills it: room for that one's beams.
-constexpr std::size_t kUsualBeams = 1 << 12;
-
 // Ids of a segment, each written once.
 class IdTable {
  public:
@@ -57,11 +54,6 @@ class IdTable {
 
 class SegmentWriter {
  public:
-  // `beams`: how many may come.
-  explicit SegmentWriter(std::size_t beams) {
-    beams_.reserve(std::min(beams, kTargetBeams + kUsualBeams));
-  }
-
   void Add(const JournalRecord& record) {
     if (segment_.record_count == 0) segment_.first_revision = record.revision;
     segment_.last_revision = record.revision;
@@ -279,19 +271,13 @@ absl::Status CheckRecord(const JournalRecord& record) {
 absl::StatusOr<std::vector<JournalSegment>> EncodeJournal(
     std::span<const JournalRecord> records) {
   std::vector<JournalSegment> segments;
-  std::size_t beams = 0;
-  for (const JournalRecord& record : records) {
-    if (const auto* ping = std::get_if<PingRecord>(&record.event)) {
-      beams += ping->ping.beams.size();
-    }
-  }
-  SegmentWriter writer(beams);
+  SegmentWriter writer;
   for (const JournalRecord& record : records) {
     FATHOM_RETURN_IF_ERROR(CheckRecord(record));
     writer.Add(record);
     if (writer.full()) {
       segments.push_back(writer.Finish());
-      writer = SegmentWriter(beams);
+      writer = SegmentWriter();
     }
   }
   if (!writer.empty()) segments.push_back(writer.Finish());

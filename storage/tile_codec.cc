@@ -15,13 +15,14 @@ namespace fathom::storage {
 namespace {
 
 constexpr std::uint8_t kTileVersion = 1;
-constexpr std::uint8_t kBlockVersion = 1;
+constexpr std::uint8_t kBlockVersion = 2;
 
 enum BlockFlag : std::uint8_t {
   kHasTransferred = 1,
   kHasPriorGrid = 2,
   kHasNervegna = 4,
-  kAllBlockFlags = 7,
+  kHasPending = 8,
+  kAllBlockFlags = 15,
 };
 
 // One bit per cell, cell k in bit k % 8 of byte k / 8.
@@ -113,6 +114,7 @@ Bytes EncodeBlock(const BlockKey& key, const map::LocalBlock& block) {
   if (!block.transferred.empty()) flags |= kHasTransferred;
   if (block.prior_grid != nullptr) flags |= kHasPriorGrid;
   if (!block.nervegna.empty()) flags |= kHasNervegna;
+  if (!block.pending.empty()) flags |= kHasPending;
   writer.PutU8(flags);
   writer.PutF32(block.uniform_prior.depth_m);
   writer.PutF32(block.uniform_prior.std_m);
@@ -127,6 +129,11 @@ Bytes EncodeBlock(const BlockKey& key, const map::LocalBlock& block) {
   }
   static_assert(sizeof(map::NervegnaCell) == 8);
   PutColumnBytes(block.nervegna.data(), block.nervegna.size(), 8, writer);
+  static_assert(sizeof(map::PendingShoal) == 16);
+  if (!block.pending.empty()) {
+    writer.PutVarint(block.pending.size());
+    PutColumnBytes(block.pending.data(), block.pending.size(), 16, writer);
+  }
   return SealBlob(BlobKind::kLocalBlock, kBlockVersion, std::move(writer));
 }
 
@@ -165,6 +172,10 @@ absl::StatusOr<map::LocalBlock> DecodeBlock(const BlockKey& key,
   if ((flags & kHasNervegna) != 0) {
     block.nervegna.resize(map::kBlockCells);
     GetColumnBytes(reader, map::kBlockCells, 8, block.nervegna.data());
+  }
+  if ((flags & kHasPending) != 0) {
+    block.pending.resize(reader.GetCount(map::kBlockCells));
+    GetColumnBytes(reader, block.pending.size(), 16, block.pending.data());
   }
   FATHOM_RETURN_IF_ERROR(reader.Finish(what));
   return block;

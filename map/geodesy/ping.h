@@ -55,7 +55,8 @@ enum class RejectReason : std::uint8_t {
   kBadDepth = 6,       // Depth outside [-100, 12000] m.
   kInvalidMessage = 7,
   kNoActivity = 8,     // The named activity is not open.
-  kGated = 9,          // The innovation gate refused it (contacts).
+  kGated = 9,          // A gate refused it: the innovation of a contact's
+                       // report, the gross shoal of a sounding.
   kTooLate = 10,       // Older than late reports are accepted (contacts).
   kContactsFull = 11,  // The contact list is full.
 };

@@ -32,6 +32,7 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
 
 #include "map/geodesy/depth_fusion.h"
 #include "map/local/evidence.h"
@@ -51,8 +52,9 @@ inline constexpr std::size_t kCenter = 4;
 
 // What the surroundings say about the variability inside a cell.
 struct RegionalVariability {
-  double variance_m2 = 0.0;         // Their estimate of tau^2, > 0.
-  double degrees_of_freedom = 0.0;  // How much it counts, > 0.
+  double variance_m2 = 0.0;     // Their estimate of tau^2; noise may make it
+                                // a little negative.
+  double uncertainty_m4 = 0.0;  // The variance of that estimate, > 0.
 };
 
 // From the steps between the measured cells of the neighbourhood (the centre
@@ -70,8 +72,14 @@ double MeanVarianceOf(const Evidence& evidence, double variability_m2);
 // The whole reading of a measured cell: mean and predictive variance. A prior
 // of kind kNone or kLand is left out. REQUIRES: cells[kCenter] not null and
 // not empty.
-MeanVariance ReadAdaptive(const Neighbourhood& cells, const CellPrior& prior,
-                          double cell_size_m);
+struct AdaptiveReading {
+  MeanVariance predictive;
+  double variability_m2 = 0.0;  // tau^2, a part of predictive.variance_m2.
+  // hazard_m of DepthEstimate; NaN: none.
+  float hazard_m = std::numeric_limits<float>::quiet_NaN();
+};
+AdaptiveReading ReadAdaptive(const Neighbourhood& cells, const CellPrior& prior,
+                             double cell_size_m);
 
 }  // namespace fathom::map
 

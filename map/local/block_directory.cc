@@ -37,6 +37,7 @@ void BlockDirectory::CountArrays(const LocalBlock& block, std::int64_t sign) {
   const std::size_t bytes =
       block.transferred.size() * sizeof(Evidence) +
       block.nervegna.size() * sizeof(NervegnaCell) +
+      block.pending.size() * sizeof(PendingShoal) +
       (block.prior_grid == nullptr ? 0 : sizeof(PriorGrid));
   array_bytes_ += static_cast<std::uint64_t>(sign) * bytes;
 }

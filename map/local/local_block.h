@@ -12,6 +12,7 @@
 #ifndef FATHOM_MAP_LOCAL_LOCAL_BLOCK_H_
 #define FATHOM_MAP_LOCAL_LOCAL_BLOCK_H_
 
+#include <algorithm>
 #include <array>
 #include <compare>
 #include <cstddef>
@@ -21,6 +22,7 @@
 
 #include "map/geodesy/depth_estimate.h"
 #include "map/local/evidence.h"
+#include "map/local/hazard.h"
 
 namespace fathom::map {
 
@@ -82,6 +84,10 @@ struct LocalBlock {
   // `nervegna`: 256 cells; other estimators: empty.
   std::vector<NervegnaCell> nervegna;
 
+  // `adaptive` only: soundings that wait for a second one (map/local/hazard.h),
+  // at most one a cell, in order of cell. Nearly always empty.
+  std::vector<PendingShoal> pending;
+
   CellPrior prior(std::size_t k) const {
     if (prior_grid == nullptr) return uniform_prior;
     return {prior_grid->depth_m[k], prior_grid->std_m[k], prior_grid->kind[k]};
@@ -91,6 +97,14 @@ struct LocalBlock {
     Evidence all = evidence[k];
     if (!transferred.empty()) all.Merge(transferred[k]);
     return all;
+  }
+  // Null: none waits in the cell.
+  const PendingShoal* PendingAt(std::size_t k) const {
+    if (pending.empty()) return nullptr;
+    const auto found = std::find_if(
+        pending.begin(), pending.end(),
+        [k](const PendingShoal& shoal) { return shoal.cell == k; });
+    return found == pending.end() ? nullptr : &*found;
   }
   bool measured(std::size_t k) const {
     return (evidence[k].flags & kDirectlyUpdated) != 0;

@@ -50,19 +50,6 @@ std::optional<RejectReason> Threshold(const Beam& beam,
   return std::nullopt;
 }
 
-// Whether Threshold passes the beam, in one test without branches; NaN fails
-// it.
-bool Passes(const Beam& beam, const LocalMapOptions& options) {
-  return static_cast<int>(beam.range_m > options.min_range_m) &
-         static_cast<int>(beam.range_m < options.max_range_m) &
-         static_cast<int>(beam.std_m > 0.0f) &
-         static_cast<int>(beam.std_m <= kMaxStdM) &
-         static_cast<int>(beam.depth_m >= kMinDepthM) &
-         static_cast<int>(beam.depth_m <= kMaxDepthM) &
-         static_cast<int>(std::fabs(beam.bearing_rad) <
-                          std::numeric_limits<float>::infinity());
-}
-
 // A prior that may stand in the map: known, finite, a std above 0.
 CellPrior ToCellPrior(const std::optional<DepthEstimate>& estimate) {
   if (!estimate.has_value() || estimate->kind == EvidenceKind::kNone) return {};
@@ -104,6 +91,31 @@ void FuseNervegna(double k, double mean_m, double first_variance_m2,
   cell.mean_m = static_cast<float>(CorrectMean(k, cell.mean_m, mean_m));
 }
 
+// The floor that a sounding of cell k is held against: the mean of its own
+// soundings; while these are few the shoalest of its measured neighbours in
+// the block; NaN where these are few too.
+float FloorAround(const LocalBlock& block, std::size_t k) {
+  const Evidence own = block.AllEvidence(k);
+  if (own.count >= kGateSoundings) return own.mean_m;
+  const std::size_t row = k / kBlockSide;
+  const std::size_t col = k % kBlockSide;
+  float shoalest_m = std::numeric_limits<float>::infinity();
+  std::uint32_t neighbours = 0;
+  for (std::size_t i = row == 0 ? 0 : row - 1;
+       i <= std::min<std::size_t>(row + 1, kBlockSide - 1); ++i) {
+    for (std::size_t j = col == 0 ? 0 : col - 1;
+         j <= std::min<std::size_t>(col + 1, kBlockSide - 1); ++j) {
+      const std::size_t near = i * kBlockSide + j;
+      if (near == k || !block.measured(near)) continue;
+      shoalest_m = std::min(shoalest_m, block.AllEvidence(near).mean_m);
+      ++neighbours;
+    }
+  }
+  return neighbours >= kGateNeighbours
+             ? shoalest_m
+             : std::numeric_limits<float>::quiet_NaN();
+}
+
 std::int64_t CountMeasuredCells(const LocalBlock& block) {
   std::int64_t count = 0;
   for (std::size_t k = 0; k < kBlockCells; ++k) count += block.measured(k);
@@ -130,9 +142,16 @@ struct LocalMap::State {
   LocalBlock& MutableBlock(BlockIndex index, const PriorSource& prior);
   void FillPrior(BlockIndex index, const PriorSource& prior,
                  LocalBlock& block) const;
-  // `block`: the cell's, mutable.
-  void AddSounding(CellIndex cell, const Beam& beam, std::uint32_t time_s,
-                   const PriorSource& prior, LocalBlock& block);
+  // False: held back as a gross shoal. `last_m` is the depth of the ping's
+  // accepted beam before, NaN at its first.
+  bool AddSounding(CellIndex cell, const Beam& beam, std::uint32_t time_s,
+                   float last_m, const PriorSource& prior);
+  // Whether the sounding has to wait for a second one; brings in the one that
+  // waited if this is the second.
+  bool HoldBack(LocalBlock& block, std::size_t k, const Beam& beam,
+                std::uint32_t time_s);
+  void AddTo(LocalBlock& block, std::size_t k, float depth_m, float std_m,
+             std::uint32_t time_s);
   void Smooth(CellIndex cell, const NervegnaCell& updated, std::uint32_t time_s,
               const PriorSource& prior);
 
@@ -192,17 +211,63 @@ LocalBlock& LocalMap::State::MutableBlock(BlockIndex index,
   return block;
 }
 
-void LocalMap::State::AddSounding(CellIndex cell, const Beam& beam,
-                                  std::uint32_t time_s,
-                                  const PriorSource& prior, LocalBlock& block) {
-  const std::size_t k = LocalGrid::OffsetOf(cell);
+void LocalMap::State::AddTo(LocalBlock& block, std::size_t k, float depth_m,
+                            float std_m, std::uint32_t time_s) {
   Evidence& evidence = block.evidence[k];
-  evidence.Add(beam.depth_m, beam.std_m, time_s);
+  evidence.Add(depth_m, std_m, time_s);
   if ((evidence.flags & kDirectlyUpdated) == 0) {
     evidence.flags |= kDirectlyUpdated;
     directory->CountMeasured(+1);
   }
-  if (grid->options.estimator != EstimatorKind::kNervegna) return;
+}
+
+bool LocalMap::State::HoldBack(LocalBlock& block, std::size_t k,
+                               const Beam& beam, std::uint32_t time_s) {
+  auto waiting =
+      std::find_if(block.pending.begin(), block.pending.end(),
+                   [k](const PendingShoal& shoal) { return shoal.cell >= k; });
+  const bool waits = waiting != block.pending.end() && waiting->cell == k;
+  if (!IsGrossShoal(beam.depth_m, FloorAround(block, k))) {
+    if (waits && ++waiting->since >= kPendingSoundings) {
+      directory->CountArrays(block, -1);
+      block.pending.erase(waiting);
+      directory->CountArrays(block, +1);
+    }
+    return false;
+  }
+  directory->CountArrays(block, -1);
+  const bool confirmed = waits && Confirms(*waiting, beam.depth_m, beam.std_m);
+  const PendingShoal now = {.depth_m = beam.depth_m,
+                            .std_m = std::max(beam.std_m, kMinStdM),
+                            .time_s = time_s,
+                            .cell = static_cast<std::uint16_t>(k)};
+  if (confirmed) {
+    const PendingShoal first = *waiting;
+    block.pending.erase(waiting);
+    AddTo(block, k, first.depth_m, first.std_m, first.time_s);
+  } else if (waits) {
+    // The shoaler of the two goes on waiting.
+    if (now.depth_m < waiting->depth_m) *waiting = now;
+  } else {
+    block.pending.insert(waiting, now);
+  }
+  directory->CountArrays(block, +1);
+  return !confirmed;
+}
+
+bool LocalMap::State::AddSounding(CellIndex cell, const Beam& beam,
+                                  std::uint32_t time_s, float last_m,
+                                  const PriorSource& prior) {
+  LocalBlock& block = MutableBlock(LocalGrid::BlockOf(cell), prior);
+  const std::size_t k = LocalGrid::OffsetOf(cell);
+  if (grid->options.estimator == EstimatorKind::kAdaptive) {
+    // Most soundings are like the beam before and need no look at the cell.
+    const bool plain = !std::isnan(last_m) && block.pending.empty() &&
+                       !IsGrossShoal(beam.depth_m, last_m);
+    if (!plain && HoldBack(block, k, beam, time_s)) return false;
+  }
+  AddTo(block, k, beam.depth_m, beam.std_m, time_s);
+  if (grid->options.estimator != EstimatorKind::kNervegna) return true;
 
   NervegnaCell& estimate = block.nervegna[k];
   const double std_m = std::max(beam.std_m, kMinStdM);
@@ -210,6 +275,7 @@ void LocalMap::State::AddSounding(CellIndex cell, const Beam& beam,
   FuseNervegna(Gain(estimate.variance_m2, variance_m2), beam.depth_m,
                variance_m2, estimate);
   if (grid->reach > 0) Smooth(cell, estimate, time_s, prior);
+  return true;
 }
 
 // Eqs. 4.22 to 4.25, block by block so that each is looked up once.
@@ -273,16 +339,11 @@ LocalMap::UpdateResult LocalMap::Update(const Ping& ping,
       std::remainder(ping.pose.heading_deg, 360.0) * kRadPerDeg +
       grid.frame.NorthAzimuthRad(ping.pose.position);
   const std::uint32_t time_s = ToUnixSeconds(ping.time);
-  // Neighbouring beams fall in few blocks: each is looked up once in a row.
-  // It stays where it is while this view's epoch lasts.
-  LocalBlock* block = nullptr;
-  BlockIndex block_index;
+  float last_m = std::numeric_limits<float>::quiet_NaN();
   for (const Beam& beam : ping.beams) {
-    if (!Passes(beam, grid.options)) {
-      if (const auto bad = Threshold(beam, grid.options)) {
-        result.rejects.Add(*bad);
-        continue;
-      }
+    if (const std::optional<RejectReason> bad = Threshold(beam, grid.options)) {
+      result.rejects.Add(*bad);
+      continue;
     }
     const NedPoint obstacle = ObstaclePosition(
         vehicle, BeamOffset(beam.range_m,
@@ -292,12 +353,11 @@ LocalMap::UpdateResult LocalMap::Update(const Ping& ping,
       result.rejects.Add(RejectReason::kOutsideArea);
       continue;
     }
-    const BlockIndex index = LocalGrid::BlockOf(cell);
-    if (block == nullptr || index != block_index) {
-      block = &state_->MutableBlock(index, prior);
-      block_index = index;
+    if (!state_->AddSounding(cell, beam, time_s, last_m, prior)) {
+      result.rejects.Add(RejectReason::kGated);
+      continue;
     }
-    state_->AddSounding(cell, beam, time_s, prior, *block);
+    last_m = beam.depth_m;
     ++result.accepted;
   }
   return result;
@@ -342,6 +402,15 @@ absl::Status LocalMap::RestoreBlock(BlockIndex index, LocalBlock block) {
     return absl::InvalidArgumentError(absl::StrFormat(
         "block row=%u col=%u: transferred cells=%u must be 0 or 256", index.row,
         index.col, block.transferred.size()));
+  }
+  for (std::size_t n = 0; n < block.pending.size(); ++n) {
+    const std::uint16_t cell = block.pending[n].cell;
+    if (cell >= kBlockCells || (n > 0 && cell <= block.pending[n - 1].cell)) {
+      return absl::InvalidArgumentError(absl::StrFormat(
+          "block row=%u col=%u: pending[%u].cell=%u must be below 256 and in "
+          "order",
+          index.row, index.col, n, cell));
+    }
   }
   BlockDirectory& mine = state_->MutableDirectory();
   bool created = false;

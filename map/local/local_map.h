@@ -61,6 +61,8 @@ class LocalMap {
   //   kBadStd        std <= 0 or > kMaxStdM
   //   kBadDepth      depth outside [kMinDepthM, kMaxDepthM]
   //   kOutsideArea   the cell is not in the map
+  //   kGated         `adaptive`: a gross shoal that waits for a second sounding
+  //                  (map/local/hazard.h)
   // The first that applies in this order counts. `prior` (may be null) is
   // asked for all 256 cells of a block when the block is first touched, never
   // again; where it has no answer the configured default holds. Its positions

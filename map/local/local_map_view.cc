@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "absl/base/macros.h"
@@ -87,6 +88,20 @@ DepthEstimate ToEstimate(const MeanVariance& read, EvidenceKind kind,
           .cell_size_m = static_cast<float>(cell_size_m)};
 }
 
+DepthEstimate FromAdaptive(const AdaptiveReading& read,
+                           const Evidence& evidence,
+                           const PendingShoal* pending, double cell_size_m) {
+  DepthEstimate estimate = ToEstimate(read.predictive, EvidenceKind::kMeasured,
+                                      evidence, cell_size_m);
+  estimate.variability_m = static_cast<float>(std::sqrt(read.variability_m2));
+  estimate.hazard_m = read.hazard_m;
+  if (pending != nullptr) {
+    // fmin: of a NaN and a number the number.
+    estimate.hazard_m = std::fmin(estimate.hazard_m, HazardDepth(*pending));
+  }
+  return estimate;
+}
+
 MeanVariance FromNervegna(const NervegnaCell& cell) {
   return {.mean_m = cell.mean_m, .variance_m2 = cell.variance_m2};
 }
@@ -114,12 +129,51 @@ std::optional<DepthEstimate> ReadMeasured(const LocalGrid& grid,
     case EstimatorKind::kAdaptive: {
       Merged merged;
       const Neighbourhood cells = Around(grid, directory, cell, merged);
-      evidence = *cells[kCenter];
-      read = ReadAdaptive(cells, place.block->prior(place.k), cell_size_m);
-      break;
+      return FromAdaptive(
+          ReadAdaptive(cells, place.block->prior(place.k), cell_size_m),
+          *cells[kCenter], place.block->PendingAt(place.k), cell_size_m);
     }
   }
   return ToEstimate(read, EvidenceKind::kMeasured, evidence, cell_size_m);
+}
+
+struct MeasuredList {
+  std::array<MeasuredNear, kMaxMeasuredNear> cells;
+  std::size_t count = 0;
+  std::span<const MeasuredNear> span() const { return {cells.data(), count}; }
+};
+
+// Rings beyond smoothing's reach that still tell how rough the floor is: a
+// variogram from one or two pairs is nearly a guess.
+constexpr std::int32_t kRoughnessRings = 4;
+
+// The measured cells about `cell`, ring by ring outward until there are
+// kMaxMeasuredNear; none if none lies within smoothing's reach.
+MeasuredList MeasuredAround(const LocalGrid& grid,
+                            const BlockDirectory& directory, CellIndex cell) {
+  MeasuredList near;
+  const auto look = [&](std::int32_t north, std::int32_t east) {
+    const CellIndex at = {.i = cell.i + north, .j = cell.j + east};
+    if (near.count == kMaxMeasuredNear || !grid.Contains(at)) return;
+    const Place place = PlaceOf(directory, at);
+    if (place.block == nullptr || !place.block->measured(place.k)) return;
+    near.cells[near.count++] = {.north = north,
+                                .east = east,
+                                .evidence = place.block->AllEvidence(place.k)};
+  };
+  const auto reach = static_cast<std::int32_t>(grid.reach);
+  for (std::int32_t ring = 1; ring <= reach + kRoughnessRings; ++ring) {
+    if (ring == reach + 1 && near.count == 0) break;
+    for (std::int32_t along = -ring; along <= ring; ++along) {
+      look(-ring, along);
+      look(ring, along);
+    }
+    for (std::int32_t along = 1 - ring; along < ring; ++along) {
+      look(along, -ring);
+      look(along, ring);
+    }
+  }
+  return near;
 }
 
 // What smoothing wrote (nervegna) or reads (the others) for a cell that was
@@ -138,11 +192,13 @@ std::optional<DepthEstimate> ReadUnmeasured(const LocalGrid& grid,
                       grid.options.cell_size_m);
   }
   if (grid.reach == 0) return std::nullopt;
-  const std::optional<DepthEstimate> smoothed = ReadSmoothed(
-      cell, SmoothBounds(cell, grid.reach, grid.cells_north, grid.cells_east),
-      grid.options.smoothing_scale, grid.options.cell_size_m,
-      [&](CellIndex near) { return ReadMeasured(grid, directory, near); });
+  const MeasuredList near = MeasuredAround(grid, directory, cell);
+  std::optional<DepthEstimate> smoothed = ReadSmoothed(
+      near.span(), grid.options.smoothing_scale, grid.options.cell_size_m);
   if (!smoothed.has_value() || place.block == nullptr) return smoothed;
+  if (const PendingShoal* shoal = place.block->PendingAt(place.k)) {
+    smoothed->hazard_m = HazardDepth(*shoal);
+  }
   const CellPrior prior = place.block->prior(place.k);
   const bool prior_is_better =
       prior.kind == EvidenceKind::kLand ||
@@ -213,8 +269,8 @@ std::optional<DepthEstimate> LocalMapView::EvidenceAt(
       Merged merged;
       Neighbourhood cells = Around(*grid_, *directory_, *cell, merged);
       cells[kCenter] = &evidence;
-      read = ReadAdaptive(cells, CellPrior{}, cell_size_m);
-      break;
+      return FromAdaptive(ReadAdaptive(cells, CellPrior{}, cell_size_m),
+                          evidence, nullptr, cell_size_m);
     }
   }
   return ToEstimate(read, EvidenceKind::kMeasured, evidence, cell_size_m);

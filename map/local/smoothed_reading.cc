@@ -5,98 +5,116 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <vector>
 
-#include "map/local/local_map_options.h"
+#include "map/local/adaptive.h"
 
 namespace fathom::map {
 namespace {
 
-struct Step {
-  double square_sum = 0.0;
-  double count = 0.0;
-  void Add(const std::optional<DepthEstimate>& a,
-           const std::optional<DepthEstimate>& b) {
-    if (!a.has_value() || !b.has_value()) return;
-    const double step_m =
-        static_cast<double>(b->depth_m) - static_cast<double>(a->depth_m);
-    square_sum += step_m * step_m;
-    count += 1.0;
-  }
-};
+// The guess of kTypicalSlope weighs as one pair, and counts for no more than
+// this many times what the pairs say.
+constexpr double kTypicalPairs = 0.5;
+constexpr double kFewPairs = 1.0;
+constexpr double kMostTypical = 4.0;
+// E |x - x'|^1.5 between random points of a unit square is 0.399; half of it
+// is the variance inside.
+constexpr double kInsideUnitSquare = 0.2;
 
-// D^2 of the header, per cell squared.
-double Roughness(const std::vector<std::optional<DepthEstimate>>& box,
-                 std::size_t rows, std::size_t cols, double cell_size_m) {
-  Step north;
-  Step east;
-  for (std::size_t row = 0; row < rows; ++row) {
-    for (std::size_t col = 0; col < cols; ++col) {
-      const std::optional<DepthEstimate>& here = box[row * cols + col];
-      if (row + 1 < rows) north.Add(here, box[(row + 1) * cols + col]);
-      if (col + 1 < cols) east.Add(here, box[row * cols + col + 1]);
-    }
-  }
-  const double typical_m = kTypicalSlope * cell_size_m;
-  double square = 0.0;
-  if (north.count > 0.0) square += north.square_sum / north.count;
-  if (east.count > 0.0) square += east.square_sum / east.count;
-  // One axis without a pair: it is taken to step as the other does.
-  if ((north.count > 0.0) != (east.count > 0.0)) square *= 2.0;
-  return std::max(square, typical_m * typical_m);
-}
+// h^1.5 from h^2.
+double Power(double square) { return std::sqrt(square * std::sqrt(square)); }
 
 }  // namespace
 
-std::optional<DepthEstimate> ReadSmoothed(CellIndex cell,
-                                          const NeighbourBounds& bounds,
-                                          double scale, double cell_size_m,
-                                          const MeasuredReader& read) {
-  if (scale <= 0.0) return std::nullopt;
-  const auto rows = static_cast<std::size_t>(bounds.north - bounds.south) + 1;
-  const auto cols = static_cast<std::size_t>(bounds.east - bounds.west) + 1;
-  std::vector<std::optional<DepthEstimate>> box(rows * cols);
-  bool any = false;
-  for (std::size_t k = 0; k < box.size(); ++k) {
-    box[k] = read({.i = bounds.south + static_cast<std::int32_t>(k / cols),
-                   .j = bounds.west + static_cast<std::int32_t>(k % cols)});
-    any = any || box[k].has_value();
-  }
-  if (!any) return std::nullopt;
+std::optional<DepthEstimate> ReadSmoothed(std::span<const MeasuredNear> near,
+                                          double scale, double cell_size_m) {
+  if (near.empty() || !(scale > 0.0)) return std::nullopt;
+  const std::size_t count = std::min(near.size(), kMaxMeasuredNear);
 
-  const double roughness_m2 = Roughness(box, rows, cols, cell_size_m);
-  double weight_sum = 0.0;
-  double mean_m = 0.0;
-  double spread = 0.0;  // Sum of w (z - mean)^2, Welford.
-  double worst_m2 = 0.0;
-  std::uint32_t nearest = kMaxSmoothReach;
+  // Noise of the means, and what the cells' scatter says of variability.
+  std::array<double, kMaxMeasuredNear> noise_m2;
+  std::array<double, kMaxMeasuredNear> apart;  // h_k^1.5
+  double excess = 0.0;
+  double stated_m2 = 0.0;
+  double freedom = 0.0;
   std::uint32_t oldest_s = std::numeric_limits<std::uint32_t>::max();
-  for (std::size_t k = 0; k < box.size(); ++k) {
-    if (!box[k].has_value()) continue;
-    const DepthEstimate& from = *box[k];
-    const std::uint32_t apart = CellsApart(
-        cell, {.i = bounds.south + static_cast<std::int32_t>(k / cols),
-               .j = bounds.west + static_cast<std::int32_t>(k % cols)});
-    const double variance_m2 = static_cast<double>(from.std_m) * from.std_m;
-    const double weight =
-        1.0 / (variance_m2 + roughness_m2 * static_cast<double>(apart) * apart);
-    const double from_old_m = from.depth_m - mean_m;
-    weight_sum += weight;
-    mean_m += from_old_m * weight / weight_sum;
-    spread += weight * from_old_m * (from.depth_m - mean_m);
-    worst_m2 = std::max(worst_m2, variance_m2);
-    nearest = std::min(nearest, apart);
-    oldest_s = std::min(oldest_s, from.time_s);
+  for (std::size_t k = 0; k < count; ++k) {
+    const Evidence& evidence = near[k].evidence;
+    const double n = evidence.count;
+    noise_m2[k] = 1.0 / evidence.weight;
+    excess += (evidence.scatter - (n - 1.0)) * n * noise_m2[k];
+    stated_m2 += (n - 1.0) * n * noise_m2[k];
+    freedom += n - 1.0;
+    oldest_s = std::min(oldest_s, evidence.time_s);
+    apart[k] =
+        Power(near[k].north * near[k].north + near[k].east * near[k].east);
   }
-  const double variance_m2 =
-      (worst_m2 + roughness_m2 * static_cast<double>(nearest) * nearest +
-       spread / weight_sum) /
-      scale;
-  return DepthEstimate{.depth_m = static_cast<float>(mean_m),
-                       .std_m = static_cast<float>(std::sqrt(variance_m2)),
-                       .kind = EvidenceKind::kSmoothed,
-                       .time_s = oldest_s,
-                       .cell_size_m = static_cast<float>(cell_size_m)};
+  // What chance alone may bring about is not taken for variability.
+  const double scatter_m2 =
+      freedom > 0.0 ? (excess - stated_m2 * std::sqrt(2.0 / freedom)) / freedom
+                    : 0.0;
+
+  // R from the pairs, each mean's share of its cell's variability taken off.
+  std::array<std::array<double, kMaxMeasuredNear>, kMaxMeasuredNear> between;
+  double rough_sum = 0.0;
+  double noise_sum = 0.0;
+  double pairs = 0.0;
+  for (std::size_t a = 0; a < count; ++a) {
+    for (std::size_t b = 0; b < a; ++b) {
+      const std::int32_t north = near[a].north - near[b].north;
+      const std::int32_t east = near[a].east - near[b].east;
+      between[a][b] = Power(north * north + east * east);
+      const double step_m =
+          double{near[a].evidence.mean_m} - double{near[b].evidence.mean_m};
+      const double noise = noise_m2[a] + noise_m2[b];
+      rough_sum += (step_m * step_m - noise) / between[a][b];
+      noise_sum += noise / between[a][b];
+      pairs += 1.0;
+    }
+  }
+  const double typical_m = kTypicalSlope * cell_size_m;
+  double rough_m2 = typical_m * typical_m;
+  if (pairs > 0.0) {
+    // Pairs share their ends: `count` cells hold count - 1 steps.
+    const double steps = static_cast<double>(count) - 1.0;
+    // Not below what the noise could hide: the mean of a normal about 0, cut
+    // off below 0, is 0.8 of its std.
+    const double hidden = 0.15 * std::sqrt(2.0 / steps) * noise_sum / pairs;
+    const double by_pairs = std::max(hidden, rough_sum / pairs);
+    const double guess = std::min(rough_m2, kMostTypical * by_pairs + kMinStdM);
+    rough_m2 =
+        (steps * by_pairs + kTypicalPairs * guess) / (steps + kTypicalPairs);
+    rough_m2 *= 1.0 + kFewPairs / steps;
+  }
+
+  const double variability_m2 =
+      std::max(scatter_m2, kInsideUnitSquare * rough_m2);
+  for (std::size_t k = 0; k < count; ++k) {
+    noise_m2[k] += variability_m2 / near[k].evidence.count;
+  }
+  std::array<double, kMaxMeasuredNear> weight;
+  double weight_sum = 0.0;
+  for (std::size_t k = 0; k < count; ++k) {
+    weight[k] = 1.0 / (noise_m2[k] + rough_m2 * apart[k]);
+    weight_sum += weight[k];
+  }
+  double mean_m = 0.0;
+  double error_m2 = 0.0;
+  for (std::size_t k = 0; k < count; ++k) {
+    weight[k] /= weight_sum;
+    mean_m += weight[k] * double{near[k].evidence.mean_m};
+    error_m2 += weight[k] * (rough_m2 * apart[k] + weight[k] * noise_m2[k]);
+    for (std::size_t b = 0; b < k; ++b) {
+      error_m2 -= weight[k] * weight[b] * rough_m2 * between[k][b];
+    }
+  }
+  const double variance_m2 = (std::max(error_m2, 0.0) + variability_m2) / scale;
+  return DepthEstimate{
+      .depth_m = static_cast<float>(mean_m),
+      .std_m = std::max(kMinStdM, static_cast<float>(std::sqrt(variance_m2))),
+      .kind = EvidenceKind::kSmoothed,
+      .time_s = oldest_s,
+      .cell_size_m = static_cast<float>(cell_size_m),
+      .variability_m = static_cast<float>(std::sqrt(variability_m2))};
 }
 
 }  // namespace fathom::map

@@ -109,6 +109,10 @@ ObstacleAnswer Answer(const ObstacleQuery& query,
                       const ContactsView& contacts, const QueryModel& model) {
   ObstacleAnswer answer;
   const bool known = seabed.has_value() && IsKnown(seabed->estimate);
+  // False for a hazard that is NaN: none.
+  const bool at_hazard =
+      known && query.depth_m + query.vertical_clearance_m >=
+                   static_cast<double>(seabed->estimate.hazard_m);
   if (known) {
     SeabedReason& reason = answer.seabed.emplace();
     reason.estimate = seabed->estimate;
@@ -118,6 +122,9 @@ ObstacleAnswer Answer(const ObstacleQuery& query,
     reason.probability = StaticProbability(
         seabed->estimate, query.depth_m + query.vertical_clearance_m,
         reason.age_s.value_or(0.0), model);
+    if (at_hazard) {
+      reason.probability = std::max(reason.probability, kHazardShare);
+    }
     answer.probability = reason.probability;
   }
   contacts.ForEachNear(
@@ -140,6 +147,9 @@ ObstacleAnswer Answer(const ObstacleQuery& query,
       });
   answer.state =
       ClassifyProbability(answer.probability, query.confidence, known);
+  if (at_hazard && answer.state == ObstacleState::kFree) {
+    answer.state = ObstacleState::kUncertain;
+  }
   return answer;
 }
 

@@ -12,6 +12,10 @@
 //   P         = 1 - (1 - P_static) prod(1 - P_contact)
 //
 //   OCCUPIED if P >= c, else FREE if P <= 1 - c, else UNCERTAIN.
+//   At and below a point hazard (DepthEstimate::hazard_m, z + h >= hazard_m)
+//   something narrower than the cell was sounded: P_static is then at least
+//   kHazardShare, the share of the cell that it is taken to fill, and the
+//   state is never FREE.
 //   Where neither a measurement nor a chart covers the point the seabed adds
 //   nothing and the state is OCCUPIED if the contacts alone make P >= c, else
 //   UNKNOWN: never FREE, never dressed up as 0.5.
@@ -50,6 +54,10 @@ struct ObstacleQuery {
   // r, metres, >= 0.
   double radius_m = 0;
 };
+
+// The least P_static at and below a point hazard: a little more than a reader
+// of P alone at the usual confidence of 0.95 takes for free.
+inline constexpr double kHazardShare = 0.06;
 
 // The numbers are those of fathom.v1.ObstacleState.
 enum class ObstacleState : std::uint8_t {

@@ -112,6 +112,7 @@ void ExpectSameBlock(const map::LocalBlock& a, const map::LocalBlock& b) {
     EXPECT_EQ(*a.prior_grid, *b.prior_grid);
   }
   EXPECT_EQ(a.nervegna, b.nervegna);
+  EXPECT_EQ(a.pending, b.pending);
 }
 
 map::LocalBlock SampleBlock(int touched) {
@@ -156,6 +157,8 @@ TEST(BlockCodec, TransferredPriorsAndNervegnaComeBack) {
   block.nervegna.assign(
       map::kBlockCells,
       {.mean_m = 21.0f, .variance_m2 = std::numeric_limits<float>::infinity()});
+  block.pending = {{.depth_m = 0.55f, .std_m = 0.1f, .time_s = 7, .cell = 3},
+                   {.depth_m = 4.0f, .std_m = 0.2f, .cell = 255, .since = 9}};
   FATHOM_ASSERT_OK_AND_ASSIGN(const map::LocalBlock back,
                               DecodeBlock(key, EncodeBlock(key, block)));
   ExpectSameBlock(block, back);

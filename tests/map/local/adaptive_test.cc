@@ -29,34 +29,46 @@ TEST(VariabilityAround, WithoutNeighboursIsThatOfATypicalSlope) {
   Evidence evidence;
   evidence.Add(20.0f, 0.5f, 1);
   const RegionalVariability around = VariabilityAround(Alone(evidence), 10.0);
-  // A step of 0.03 * 10 = 0.3 m per cell: 0.09 / 12 = 0.0075 m^2.
+  // A step of 0.03 * 10 = 0.3 m per cell: 0.09 / 12 = 0.0075 m^2, known to a
+  // factor: (1.6 * (0.0075 + 0.0001))^2 = 1.4787e-4.
   EXPECT_NEAR(around.variance_m2, 0.0075, 1e-12);
-  EXPECT_EQ(around.degrees_of_freedom, 0.5);
+  EXPECT_NEAR(around.uncertainty_m4, 1.4787e-4, 1e-8);
 }
 
 TEST(VariabilityAround, APlaneVariesByItsStepsSquaredOverTwelve) {
-  // Nine cells, exact (std 1 mm), stepping 2 m north and 1 m east.
+  // Nine cells of 10000 soundings each (exact, and their places average out),
+  // stepping 2 m north and 1 m east.
   std::array<Evidence, 9> plane;
   Neighbourhood cells;
   for (std::size_t k = 0; k < 9; ++k) {
-    plane[k].Add(
-        20.0f + 2.0f * static_cast<float>(k / 3) + static_cast<float>(k % 3),
-        0.001f, 1);
+    const float depth_m =
+        20.0f + 2.0f * static_cast<float>(k / 3) + static_cast<float>(k % 3);
+    for (int n = 0; n < 10000; ++n) plane[k].Add(depth_m, 0.01f, 1);
     cells[k] = &plane[k];
   }
-  // (4 + 1) / 12 = 0.41667 with 4 degrees; typical 0.0075 with 0.5:
-  // (4 * 0.41667 + 0.5 * 0.0075) / 4.5 = 0.37120. Noise takes 2e-6 of it.
-  EXPECT_NEAR(VariabilityAround(cells, 10.0).variance_m2, 0.37120, 1e-5);
+  // Steps: (4 + 1) / 12 = 0.41667, uncertain by sampling
+  // (2 * 16 + 2 * 1) / (0.5 * 6) / 144 = 0.078704 and as a plane
+  // (0.4 * 0.41677)^2 = 0.027791: 0.106495. Typical: 0.0075 with
+  // (1.6 * 0.41677)^2 = 0.444657. The neighbours' scatter says 0 (less the
+  // stated noise) with (0.6 * 0.41677)^2 = 0.062530 and next to no sampling:
+  // each has seen 10000 soundings at one depth. Precisions 9.3901, 2.2489,
+  // 15.992: (9.3901 * 0.41667 + 2.2489 * 0.0075) / 27.631 = 0.14221.
+  EXPECT_NEAR(VariabilityAround(cells, 10.0).variance_m2, 0.14221, 2e-4);
 }
 
-TEST(VariabilityAround, OneAxisStandsForTheOtherWhereThatHasNoPair) {
+TEST(VariabilityAround, SingleSoundingsScatterInsideTheirCells) {
+  // Two exact single soundings 2 m apart, one north of the other: the step
+  // holds 2 tau^2 for their places, and the missing axis steps alike:
+  // (4 + 4) / (12 + 4) = 0.5. Sampling: 2 * 16 / 0.5 for each axis: 128 / 256 =
+  // 0.5; plane (0.4 * 0.5001)^2 = 0.040016: 0.540016. Typical 0.0075 with
+  // (1.6 * 0.5001)^2 = 0.640256. Precisions 1.85180 and 1.56188:
+  // (1.85180 * 0.5 + 1.56188 * 0.0075) / 3.41368 = 0.27466.
   Evidence south, center;
   south.Add(20.0f, 0.001f, 1);
   center.Add(22.0f, 0.001f, 1);
   Neighbourhood cells = Alone(center);
   cells[1] = &south;
-  // One pair: half a degree at (4 + 4) / 12, half at 0.0075: 0.33708.
-  EXPECT_NEAR(VariabilityAround(cells, 10.0).variance_m2, 0.33708, 1e-5);
+  EXPECT_NEAR(VariabilityAround(cells, 10.0).variance_m2, 0.27466, 1e-4);
 }
 
 TEST(VariabilityInside, IsTheScatterBeyondTheStatedNoise) {
@@ -68,17 +80,34 @@ TEST(VariabilityInside, IsTheScatterBeyondTheStatedNoise) {
     evidence.Add(k % 2 == 0 ? 19.0f : 21.0f, 0.1f, 1);
   }
   const RegionalVariability calm = {.variance_m2 = 0.0075,
-                                    .degrees_of_freedom = 0.5};
+                                    .uncertainty_m4 = 1.5e-4};
   EXPECT_NEAR(VariabilityInside(evidence, calm), 1.1011, 1e-3);
 }
 
 TEST(VariabilityInside, AgreeingSoundingsForgetASteepRegion) {
+  // Own: (0 - 99) * 100 / 10000 / 99 = -0.01, uncertain by
+  // 2 (0.01 + E)^2 / 99, where E is the region's 1.0 cut off below 0: its std
+  // is 0.7, x = 1.4286, phi / Phi = 0.14379 / 0.92344 = 0.15571: E = 1.1090 and
+  // 2 * 1.2522 / 99 = 0.025297. With the region's 0.49: precisions 39.530
+  // and 2.0408: (2.0408 - 0.3953) / 41.571 = 0.03958, std 0.15510: x =
+  // 0.25519, phi / Phi = 0.38616 / 0.60071 = 0.64284: 0.15510 * 0.89803 =
+  // 0.13928. Seven times less than the region's.
   Evidence evidence;
   for (int k = 0; k < 100; ++k) evidence.Add(20.0f, 0.1f, 1);
   const RegionalVariability steep = {.variance_m2 = 1.0,
-                                     .degrees_of_freedom = 4.5};
-  // (4.5 * 1 + (0 - 99) * 100 / 10000) / (4.5 + 99) = 3.51 / 103.5 = 0.03391.
-  EXPECT_NEAR(VariabilityInside(evidence, steep), 0.03391, 1e-4);
+                                     .uncertainty_m4 = 0.49};
+  EXPECT_NEAR(VariabilityInside(evidence, steep), 0.13928, 2e-3);
+}
+
+TEST(VariabilityInside, NoiseThatHidesItLeavesWhatItCouldHide) {
+  // Scatter as chance has it (99 for 99), region unsure about nothing: 0 with
+  // 0.01^2. E = 0.01 * 0.79788; own 0 with 2 (0.01 + 0.0079788)^2 / 99 =
+  // 6.530e-6; both 6.1300e-6, std 0.0024759, * 0.79788 = 0.0019755.
+  Evidence evidence = {
+      .weight = 10000.0f, .mean_m = 20.0f, .scatter = 99.0f, .count = 100};
+  const RegionalVariability unsure = {.variance_m2 = 0.0,
+                                      .uncertainty_m4 = 1e-4};
+  EXPECT_NEAR(VariabilityInside(evidence, unsure), 0.0019755, 1e-5);
 }
 
 TEST(FusePrior, WithinWhatIsExplainedIsEq4_18And4_20) {
@@ -109,11 +138,13 @@ TEST(Adaptive, PriorFifteenMetresWrongIsForgottenAfterTwoHits) {
       .depth_m = 20.0f, .std_m = 1.0f, .kind = EvidenceKind::kPrior};
   Evidence evidence;
   evidence.Add(35.0f, 0.5f, 1);
-  const MeanVariance one = ReadAdaptive(Alone(evidence), wrong, 10.0);
+  const MeanVariance one =
+      ReadAdaptive(Alone(evidence), wrong, 10.0).predictive;
   // Either may be wrong: k = 1 / 1.25 = 0.8 about, k (1 - k) 225 = 36 m^2.
   EXPECT_GT(std::sqrt(one.variance_m2), 5.0);
   evidence.Add(35.0f, 0.5f, 2);
-  const MeanVariance two = ReadAdaptive(Alone(evidence), wrong, 10.0);
+  const MeanVariance two =
+      ReadAdaptive(Alone(evidence), wrong, 10.0).predictive;
   // Widened prior: 225 m^2 about; pulls by 15 * 0.125 / 225 = 8 mm.
   EXPECT_NEAR(two.mean_m, 35.0, 0.02);
   // sigma / sqrt(2) = 0.354 and a little variability.
@@ -137,7 +168,8 @@ TEST(Adaptive, DisagreeingCertainSoundingsLeaveAStdNotBelowTheirSpread) {
       sum2 += depth_m * depth_m;
     }
     const double spread_m = std::sqrt((sum2 - sum * sum / n) / (n - 1));
-    const MeanVariance read = ReadAdaptive(Alone(evidence), CellPrior{}, 10.0);
+    const MeanVariance read =
+        ReadAdaptive(Alone(evidence), CellPrior{}, 10.0).predictive;
     EXPECT_GE(std::sqrt(read.variance_m2), spread_m) << n;
     EXPECT_LE(std::sqrt(read.variance_m2), 1.5 * spread_m) << n;
     EXPECT_NEAR(read.mean_m, sum / n, 1e-3) << n;
@@ -162,7 +194,8 @@ TEST(Adaptive, AgreeingPingsReachTheOptimum) {
                      static_cast<float>(kSigmaM), 1);
       }
       // 1 m cells: hardly any variability is presumed.
-      const MeanVariance read = ReadAdaptive(Alone(evidence), kPrior20, 1.0);
+      const MeanVariance read =
+          ReadAdaptive(Alone(evidence), kPrior20, 1.0).predictive;
       const double error_m = read.mean_m - truth_m;
       square += error_m * error_m;
       within_1 += error_m * error_m <= read.variance_m2;

@@ -4,98 +4,102 @@
 
 #include <cmath>
 #include <random>
+#include <vector>
 
 #include "tests/map/local/local_test_map.h"
 
 namespace fathom::map {
 namespace {
 
-const NeighbourBounds kBox = {.north = 12, .east = 12, .south = 8, .west = 8};
 const CellIndex kAsked = {.i = 10, .j = 10};
 
-DepthEstimate Measured(float depth_m, float std_m) {
-  return {.depth_m = depth_m,
-          .std_m = std_m,
-          .kind = EvidenceKind::kMeasured,
-          .time_s = 500};
+MeasuredNear Near(std::int32_t north, std::int32_t east, float depth_m,
+                  float std_m, int hits = 1) {
+  MeasuredNear near = {.north = north, .east = east, .evidence = {}};
+  for (int n = 0; n < hits; ++n) near.evidence.Add(depth_m, std_m, 500);
+  return near;
 }
 
 TEST(ReadSmoothed, OneNeighbourGivesItsDepthAndItsStdPlusTheDistance) {
-  const auto read = [](CellIndex cell) -> std::optional<DepthEstimate> {
-    if (cell == CellIndex{.i = 12, .j = 10}) return Measured(30.0f, 0.4f);
-    return std::nullopt;
-  };
-  const std::optional<DepthEstimate> got =
-      ReadSmoothed(kAsked, kBox, 0.5, 10.0, read);
+  const std::vector<MeasuredNear> near = {Near(4, 0, 30.0f, 0.4f)};
+  const std::optional<DepthEstimate> got = ReadSmoothed(near, 0.5, 10.0);
   ASSERT_TRUE(got.has_value());
   EXPECT_EQ(got->kind, EvidenceKind::kSmoothed);
   EXPECT_EQ(got->depth_m, 30.0f);
   EXPECT_EQ(got->time_s, 500u);
   EXPECT_TRUE(std::isnan(got->shoalest_m));
-  // D = 0.03 * 10 = 0.3 m per cell, 2 cells: (0.16 + 0.09 * 4) / 0.5 = 1.04.
-  EXPECT_NEAR(got->std_m, std::sqrt(1.04), 1e-6);
+  EXPECT_TRUE(std::isnan(got->hazard_m));
+  // R = (0.03 * 10)^2 = 0.09; h^1.5 = 8: 0.72. tau^2 = 0.2 * 0.09 = 0.018.
+  // Noise 0.16 + 0.018. (0.72 + 0.178 + 0.018) / 0.5 = 1.832.
+  EXPECT_NEAR(got->std_m, std::sqrt(1.832), 1e-5);
+  EXPECT_NEAR(got->variability_m, std::sqrt(0.018), 1e-6);
 }
 
-TEST(ReadSmoothed, TwoNeighboursAreWeighedByVarianceAndDistance) {
-  const auto read = [](CellIndex cell) -> std::optional<DepthEstimate> {
-    if (cell == CellIndex{.i = 11, .j = 10}) return Measured(30.0f, 0.4f);
-    if (cell == CellIndex{.i = 8, .j = 10}) return Measured(32.0f, 0.8f);
-    return std::nullopt;
-  };
-  const DepthEstimate got = *ReadSmoothed(kAsked, kBox, 0.8, 10.0, read);
-  // w = 1 / (0.16 + 0.09) = 4 and 1 / (0.64 + 0.36) = 1: (4 * 30 + 32) / 5 =
-  // 30.4. Spread (4 * 0.16 + 2.56) / 5 = 0.64. std^2 = (0.64 + 0.09 + 0.64) /
-  // 0.8 = 1.7125.
-  EXPECT_NEAR(got.depth_m, 30.4f, 1e-5);
-  EXPECT_NEAR(got.std_m, std::sqrt(1.7125), 1e-5);
+TEST(ReadSmoothed, BetweenTwoIsSurerThanBesideTwo) {
+  // The same two depths; between them the errors of both sides cancel.
+  const std::vector<MeasuredNear> between = {Near(1, 0, 30.0f, 0.1f),
+                                             Near(-1, 0, 30.0f, 0.1f)};
+  const std::vector<MeasuredNear> beside = {Near(1, 0, 30.0f, 0.1f),
+                                            Near(3, 0, 30.0f, 0.1f)};
+  EXPECT_LT(ReadSmoothed(between, 0.9, 10.0)->std_m,
+            ReadSmoothed(beside, 0.9, 10.0)->std_m);
+}
+
+TEST(ReadSmoothed, TwoExactNeighboursFollowTheVariogram) {
+  // 1 mm soundings, 1000 a cell, 2 m apart, one cell to either side: R by the
+  // pair 4 / 2^1.5 = 1.41421; the guess 0.09 weighs half a pair beside the one
+  // step: (1.41421 + 0.5 * 0.09) / 1.5 = 0.97281, doubled for a single step:
+  // 1.94562. tau^2 = 0.38912, a thousandth of it in each mean.
+  const std::vector<MeasuredNear> near = {Near(1, 0, 30.0f, 0.001f, 1000),
+                                          Near(-1, 0, 32.0f, 0.001f, 1000)};
+  const DepthEstimate got = *ReadSmoothed(near, 0.8, 10.0);
+  EXPECT_NEAR(got.depth_m, 31.0f, 1e-4);
+  // Error: R - 2 * 1/4 * R 2^1.5 / 2 ... = R (1 - 0.25 * 2.82843) = 0.56984,
+  // and 2 * 1/4 * 0.00038912. (0.56984 + 0.00019 + 0.38912) / 0.8 = 1.19895.
+  EXPECT_NEAR(got.std_m, std::sqrt(1.19895), 2e-3);
 }
 
 TEST(ReadSmoothed, NothingNearOrNoScaleGivesNothing) {
-  const auto nothing = [](CellIndex) -> std::optional<DepthEstimate> {
-    return std::nullopt;
-  };
-  const auto all = [](CellIndex) -> std::optional<DepthEstimate> {
-    return Measured(30.0f, 0.4f);
-  };
-  EXPECT_FALSE(ReadSmoothed(kAsked, kBox, 0.5, 10.0, nothing).has_value());
-  EXPECT_FALSE(ReadSmoothed(kAsked, kBox, 0.0, 10.0, all).has_value());
+  const std::vector<MeasuredNear> one = {Near(1, 0, 30.0f, 0.4f)};
+  EXPECT_FALSE(ReadSmoothed({}, 0.5, 10.0).has_value());
+  EXPECT_FALSE(ReadSmoothed(one, 0.0, 10.0).has_value());
 }
 
-// On random neighbourhoods: never more certain than any measured neighbour,
-// nor than the distance allows.
-TEST(ReadSmoothed, IsNeverMoreCertainThanAnyNeighbourOrTheDistance) {
+// On random neighbourhoods: finite, and never surer than the variability
+// inside the asked cell.
+TEST(ReadSmoothed, IsFiniteAndNeverSurerThanTheCellIsFlat) {
   std::mt19937_64 random(3);
   std::uniform_real_distribution<float> unit(0.0f, 1.0f);
   for (int trial = 0; trial < 2000; ++trial) {
     const float filled = unit(random);
-    float worst_m = 0.0f;
-    std::uint32_t nearest = 100;
-    const auto read = [&](CellIndex cell) -> std::optional<DepthEstimate> {
-      if (cell == kAsked || unit(random) > filled) return std::nullopt;
-      const DepthEstimate one =
-          Measured(20.0f + 5.0f * unit(random), 0.01f + 2.0f * unit(random));
-      worst_m = std::max(worst_m, one.std_m);
-      nearest = std::min(nearest, CellsApart(cell, kAsked));
-      return one;
-    };
-    const auto got = ReadSmoothed(kAsked, kBox, 0.9, 10.0, read);
+    std::vector<MeasuredNear> near;
+    for (int north = -2; north <= 2; ++north) {
+      for (int east = -2; east <= 2; ++east) {
+        if ((north == 0 && east == 0) || unit(random) > filled) continue;
+        near.push_back(Near(north, east, 20.0f + 5.0f * unit(random),
+                            0.01f + 2.0f * unit(random),
+                            1 + static_cast<int>(20 * unit(random))));
+      }
+    }
+    const auto got = ReadSmoothed(near, 0.9, 10.0);
     if (!got.has_value()) continue;
-    EXPECT_GE(got->std_m, worst_m);
-    EXPECT_GE(got->std_m, 0.3f * static_cast<float>(nearest));
+    EXPECT_TRUE(std::isfinite(got->depth_m));
+    EXPECT_TRUE(std::isfinite(got->std_m));
+    EXPECT_GT(got->std_m, got->variability_m);
+    EXPECT_GE(got->depth_m, 20.0f - 1e-3f);
+    EXPECT_LE(got->depth_m, 25.0f + 1e-3f);
   }
 }
 
 TEST(ReadSmoothed, GrowsWithRoughness) {
-  const auto terrain = [](float step_m) {
-    return [step_m](CellIndex cell) -> std::optional<DepthEstimate> {
-      if (cell.i < 11) return std::nullopt;
-      return Measured(20.0f + step_m * static_cast<float>(cell.j % 2), 0.1f);
-    };
-  };
   float last_m = 0.0f;
   for (const float step_m : {0.0f, 1.0f, 2.0f, 4.0f}) {
-    const DepthEstimate got =
-        *ReadSmoothed(kAsked, kBox, 0.9, 10.0, terrain(step_m));
+    std::vector<MeasuredNear> near;
+    for (int east = -2; east <= 2; ++east) {
+      near.push_back(
+          Near(1, east, 20.0f + step_m * static_cast<float>(east & 1), 0.1f));
+    }
+    const DepthEstimate got = *ReadSmoothed(near, 0.9, 10.0);
     EXPECT_GT(got.std_m, last_m);
     last_m = got.std_m;
   }
@@ -128,7 +132,7 @@ TEST(Smoothing, PingsNextDoorMakeAnUnmeasuredCellCertainOnlyUnderNervegna) {
       EXPECT_LT(beside.std_m, 0.05f);  // The thesis's fault, shown.
     } else {
       EXPECT_GE(beside.std_m, measured.std_m);
-      // D = 0.3 m, one cell, s = 0.5: not below 0.3 / sqrt(0.5) = 0.424.
+      // R = 0.09 m^2, one cell, s = 0.5: not below 0.3 / sqrt(0.5) = 0.424.
       EXPECT_GE(beside.std_m, 0.424f);
       EXPECT_NEAR(beside.std_m, early_m, 0.15f);
     }

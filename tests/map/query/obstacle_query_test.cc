@@ -134,6 +134,29 @@ TEST(Answer, LandIsSolidAtEveryDepth) {
       Answer(At(0), Seabed(nan, nan, EvidenceKind::kLand), {}).probability, 1);
 }
 
+// A rock at 15 m, told with its margin as 14.5, in a floor of 20 +- 0.2 m.
+TEST(Answer, IsNeverFreeAtAPointHazardOrBelow) {
+  SeabedEstimate seabed = Seabed(20, 0.2f);
+  seabed.estimate.hazard_m = 14.5f;
+  const ObstacleAnswer above = Answer(At(14.4), seabed, {});
+  EXPECT_EQ(above.state, ObstacleState::kFree);
+  EXPECT_LT(above.probability, 1e-9);
+  for (const double depth_m : {14.5, 15.0, 19.0}) {
+    const ObstacleAnswer at = Answer(At(depth_m), seabed, {});
+    EXPECT_EQ(at.state, ObstacleState::kUncertain) << depth_m;
+    EXPECT_EQ(at.probability, 0.06) << depth_m;
+  }
+  // Nor for someone who calls 10 % free.
+  ObstacleQuery bold = At(15);
+  bold.confidence = 0.9;
+  EXPECT_EQ(Answer(bold, seabed, {}).state, ObstacleState::kUncertain);
+  // The clearance reaches it.
+  ObstacleQuery wide = At(12);
+  wide.vertical_clearance_m = 3;
+  EXPECT_EQ(Answer(wide, seabed, {}).state, ObstacleState::kUncertain);
+  EXPECT_EQ(Answer(At(21), seabed, {}).state, ObstacleState::kOccupied);
+}
+
 TEST(Answer, EvidenceFadesWithAgeInTheAnswerOnly) {
   ObstacleQuery query = At(18);
   query.time = kNow + std::chrono::seconds(1200);
