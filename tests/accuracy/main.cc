@@ -1,0 +1,108 @@
+// Prints the accuracy figures of the static map and writes them as JSON.
+//
+//   accuracy --data DIR [--seeds N] [--only FIGURE] --out FILE
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <map>
+
+#include "tests/accuracy/figures.h"
+
+namespace fathom::accuracy {
+namespace {
+
+std::vector<Scene> Scenes(const std::string& data) {
+  std::vector<Scene> scenes;
+  const auto add = [&](std::string name, const std::string& file, double cell_m,
+                       int cells) {
+    const std::string path = data + "/bathymetry/" + file;
+    auto terrain = Terrain::FromRaster(path, true);
+    if (!terrain.ok()) {
+      std::printf("skipped: %s\n", terrain.status().ToString().c_str());
+      return;
+    }
+    scenes.push_back({.name = std::move(name),
+                      .terrain = *std::move(terrain),
+                      .cell_m = cell_m,
+                      .cells = cells});
+  };
+  // Cells are five (three) nodes of the raster wide.
+  add("coast", "woods_hole_buzzards_10m_utm19.tif", 50, 16);
+  add("inlet", "wadden_sea_30m_utm31.tif", 150, 16);
+  add("slope", "F00788_SR_8m.tif", 24, 8);
+  add("flat", "JD211_public_Release_1-4_UTM.bag", 10, 16);
+  scenes.push_back({.name = "fractal",
+                    .terrain = Terrain::Fractal(1, 2, 30, 4),
+                    .cell_m = 10,
+                    .cells = 16});
+  return scenes;
+}
+
+// One line a row: every scalar of the row.
+void Print(const std::string& title, const nlohmann::json& rows) {
+  std::printf("\n%s\n", title.c_str());
+  for (const nlohmann::json& row : rows) {
+    std::string line;
+    for (const auto& [key, value] : row.items()) {
+      if (value.is_structured()) continue;
+      char text[64];
+      if (value.is_number_float()) {
+        std::snprintf(text, sizeof text, "%.4g", value.get<double>());
+      } else if (value.is_string()) {
+        std::snprintf(text, sizeof text, "%s",
+                      value.get<std::string>().c_str());
+      } else {
+        std::snprintf(text, sizeof text, "%s", value.dump().c_str());
+      }
+      line += "  " + key + "=" + text;
+    }
+    std::printf("%s\n", line.c_str());
+  }
+}
+
+int Run(int argc, char** argv) {
+  CLI::App app("Accuracy of the static map against truth it has never seen");
+  std::string data;
+  std::string out;
+  std::string only;
+  int seeds = 20;
+  app.add_option("--data", data, "folder of the test data")->required();
+  app.add_option("--out", out, "JSON file to write")->required();
+  app.add_option("--seeds", seeds, "surveys per figure")
+      ->check(CLI::Range(1, 1000));
+  app.add_option("--only", only, "one figure by its name");
+  CLI11_PARSE(app, argc, argv);
+
+  const std::vector<Scene> scenes = Scenes(data);
+  const std::vector<std::pair<std::string, std::function<nlohmann::json()>>>
+      figures = {
+          {"optimal", [&] { return OptimalFigures(seeds); }},
+          {"coverage", [&] { return CoverageFigures(scenes, seeds); }},
+          {"smoothed", [&] { return SmoothedFigures(scenes, seeds); }},
+          {"reliability", [&] { return ReliabilityFigures(scenes, seeds); }},
+          {"bad_prior", [&] { return BadPriorFigures(scenes, seeds); }},
+          {"hazards",
+           [&] {
+             return HazardFigures(data + "/charts", scenes.front().terrain,
+                                  seeds);
+           }},
+      };
+  nlohmann::json report = {{"seeds", seeds}};
+  for (const auto& [name, make] : figures) {
+    if (!only.empty() && only != name) continue;
+    report[name] = make();
+    Print(name, report[name]);
+  }
+  std::filesystem::create_directories(
+      std::filesystem::absolute(out).parent_path());
+  std::ofstream(out) << report.dump(2) << "\n";
+  return 0;
+}
+
+}  // namespace
+}  // namespace fathom::accuracy
+
+int main(int argc, char** argv) { return fathom::accuracy::Run(argc, argv); }
