@@ -119,6 +119,14 @@ inline constexpr size_t kMaxPendingIngestBytes = 32 * 1024 * 1024;
 inline constexpr size_t kMaxPendingCommands = 64;
 // Messages that the writer applies before it publishes a view.
 inline constexpr size_t kMaxMessagesPerView = 256;
+// Under a stream of messages a view comes at most so often: each copies the
+// blocks that were written since the last (some 60 kB for the swath of one
+// ping), so twenty pings that share one cost a twentieth. A message that comes
+// alone never waits.
+inline constexpr std::chrono::microseconds kViewInterval{1000};
+// The same for group commits, the design's shortest (2-20 ms): each costs a
+// transaction and an fsync, however little it holds.
+inline constexpr std::chrono::microseconds kCommitInterval{2000};
 
 // Concurrent ingest streams: one a vehicle or feeder; each holds at most one
 // message in hand.

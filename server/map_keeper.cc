@@ -122,10 +122,10 @@ absl::StatusOr<Room> MapKeeper::Submit(
   MutexLock lock(mutex_);
   FATHOM_RETURN_IF_ERROR(Admit());
   Push(std::move(message), listener);
-  queue_changed_.NotifyOne();
-  if (HasRoom()) return Room::kSome;
-  waiting_.push_back(std::move(listener));
-  return Room::kNone;
+  const bool room = HasRoom();
+  if (!room) waiting_.push_back(std::move(listener));
+  WakeMapper();
+  return room ? Room::kSome : Room::kNone;
 }
 
 absl::Status MapKeeper::SubmitAll(std::vector<IngestMessage> messages,
@@ -136,7 +136,7 @@ absl::Status MapKeeper::SubmitAll(std::vector<IngestMessage> messages,
     return absl::AbortedError("the queue has no room for the batch");
   }
   for (IngestMessage& message : messages) Push(std::move(message), listener);
-  queue_changed_.NotifyOne();
+  WakeMapper();
   return absl::OkStatus();
 }
 
@@ -174,7 +174,7 @@ void MapKeeper::Enqueue(Done<Result> done, Apply apply) {
     if (admitted.ok()) {
       pending_commands_ += 1;
       queue_.push_back(std::move(command));
-      queue_changed_.NotifyOne();
+      WakeMapper();
       return;
     }
   }
@@ -253,10 +253,34 @@ void MapKeeper::Checkpoint(Done<Nothing> done) {
 
 // ---- The mapper thread ----
 
+bool MapKeeper::MapperIsDue() const {
+  // A full batch; or somebody waits for a command or for room.
+  return stopping_ || queue_.size() >= options_.max_messages_per_view ||
+         pending_commands_ > 0 || !waiting_.empty();
+}
+
+void MapKeeper::WakeMapper() {
+  if (mapper_waits_ || (mapper_paces_ && MapperIsDue())) {
+    queue_changed_.NotifyOne();
+  }
+}
+
 bool MapKeeper::TakeCommands(std::vector<Command>& commands) {
   MutexLock lock(mutex_);
-  while (queue_.empty() && !stopping_) queue_changed_.Wait(mutex_);
+  while (queue_.empty() && !stopping_) {
+    mapper_waits_ = true;
+    queue_changed_.Wait(mutex_);
+    mapper_waits_ = false;
+  }
+  if (paced_from_ != SteadyTime{}) {
+    const SteadyTime due = paced_from_ + options_.view_interval;
+    mapper_paces_ = true;
+    while (!MapperIsDue() && queue_changed_.WaitUntil(mutex_, due)) {
+    }
+    mapper_paces_ = false;
+  }
   const size_t count = std::min(queue_.size(), options_.max_messages_per_view);
+  paced_from_ = count > 1 ? std::chrono::steady_clock::now() : SteadyTime{};
   const auto end = queue_.begin() + static_cast<std::ptrdiff_t>(count);
   commands.assign(std::make_move_iterator(queue_.begin()),
                   std::make_move_iterator(end));

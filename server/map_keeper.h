@@ -59,11 +59,13 @@ struct KeeperOptions {
   size_t max_pending_commands = kMaxPendingCommands;
   size_t max_messages_per_view = kMaxMessagesPerView;
   size_t journal_max_records = kJournalMaxRecords;
+  std::chrono::microseconds view_interval = kViewInterval;
+  std::chrono::microseconds commit_interval = kCommitInterval;
   std::chrono::milliseconds storage_retry_delay = kStorageRetryDelay;
   // Called once, on the storage thread, when the file must not be written any
   // more (I/O error, failed fsync): the program should end. Without it the
   // keeper only stays in fault.
-  std::function<void(const absl::Status&)> on_fatal;
+  std::function<void(const absl::Status&)> on_fatal = nullptr;
 };
 
 // Whether another message may follow.
@@ -191,6 +193,7 @@ class MapKeeper {
 
  private:
   using ViewPtr = std::shared_ptr<const map::ObstacleMapView>;
+  using SteadyTime = std::chrono::steady_clock::time_point;
 
   // One step on the way to the disk, in the order of application.
   struct StorageItem {
@@ -238,6 +241,10 @@ class MapKeeper {
   // The mapper thread.
   void RunMapper();
   bool TakeCommands(std::vector<Command>& commands);
+  // Whether the mapper should not wait for more messages; wakes it if so, or
+  // if it waits for the first.
+  bool MapperIsDue() const FATHOM_REQUIRES(mutex_);
+  void WakeMapper() FATHOM_REQUIRES(mutex_);
   MessageOutcome ApplyMessage(IngestMessage& message, StorageItem& item);
   void ApplyPing(IngestMessage& message, MessageOutcome& outcome,
                  StorageItem& item);
@@ -278,9 +285,14 @@ class MapKeeper {
   std::map<std::string, uint64_t> unsaved_imports_;
   uint64_t unsaved_import_cells_ = 0;
   uint64_t checkpoint_revision_ = 0;
+  // When the last batch of several messages began: the next one may wait for
+  // company. Epoch: the last batch was a single one.
+  SteadyTime paced_from_{};
 
   // ---- Storage thread only (and the constructor). ----
   ViewPtr saved_view_;
+  // As paced_from_, for commits.
+  SteadyTime commit_paced_from_{};
 
   mutable Mutex view_mutex_;
   ViewPtr view_ FATHOM_GUARDED_BY(view_mutex_);
@@ -290,6 +302,10 @@ class MapKeeper {
   CondVar queue_changed_;
   CondVar storage_changed_;
   std::deque<Command> queue_ FATHOM_GUARDED_BY(mutex_);
+  // The mapper waits for the first message, or for company of those that are
+  // there: nobody wakes it for less.
+  bool mapper_waits_ FATHOM_GUARDED_BY(mutex_) = false;
+  bool mapper_paces_ FATHOM_GUARDED_BY(mutex_) = false;
   std::vector<StorageItem> to_store_ FATHOM_GUARDED_BY(mutex_);
   // Listeners that were told Room::kNone.
   std::vector<std::shared_ptr<IngestListener>> waiting_

@@ -30,7 +30,16 @@ bool MapKeeper::TakeItems(std::vector<StorageItem>& items) {
         }
       }
       if (!to_store_.empty()) {
+        if (commit_paced_from_ != SteadyTime{}) {
+          const SteadyTime due = commit_paced_from_ + options_.commit_interval;
+          // Nobody waits for a command or for room: more may come along.
+          while (pending_commands_ == 0 && HasRoom() && !stopping_ &&
+                 storage_changed_.WaitUntil(mutex_, due)) {
+          }
+        }
         items.swap(to_store_);
+        commit_paced_from_ =
+            items.size() > 1 ? std::chrono::steady_clock::now() : SteadyTime{};
         return true;
       }
       if (mapper_ended_) return false;
@@ -59,6 +68,7 @@ absl::Status MapKeeper::CommitItems(std::vector<StorageItem>& items) {
   while (begin < items.size()) {
     // Up to and with the next checkpoint, which covers what is before it.
     storage::Batch batch;
+    batch.journal.reserve(items.size() - begin);
     ViewPtr checkpoint;
     size_t records = 0;
     size_t end = begin;

@@ -3,8 +3,11 @@
 #include <zstd.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cstring>
 #include <memory>
+#include <utility>
 
 namespace fathom::storage {
 namespace {
@@ -55,6 +58,88 @@ void Join(const std::uint8_t* planes, std::size_t count,
   }
 }
 
+// Sixteen bytes that the compiler keeps in one register.
+constexpr std::size_t kVector = 16;
+using Vector = std::uint8_t __attribute__((vector_size(kVector)));
+
+using Square = std::array<Vector, kVector>;
+
+// Rows i and i + 8 interleaved. (A loop over i would stay one at -O2.)
+template <std::size_t... i>
+Square Interleave(const Square& rows, std::index_sequence<i...>) {
+  Square next;
+  ((next[2 * i] =
+        __builtin_shufflevector(rows[i], rows[i + sizeof...(i)], 0, 16, 1, 17,
+                                2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23),
+    next[2 * i + 1] = __builtin_shufflevector(rows[i], rows[i + sizeof...(i)],
+                                              8, 24, 9, 25, 10, 26, 11, 27, 12,
+                                              28, 13, 29, 14, 30, 15, 31)),
+   ...);
+  return next;
+}
+
+// The square transposed: four interleavings turn each row into a column (they
+// rotate the eight bits of (row, column) by one place each).
+Square Transpose(const Square& rows) {
+  constexpr std::make_index_sequence<kVector / 2> kHalf;
+  return Interleave(
+      Interleave(Interleave(Interleave(rows, kHalf), kHalf), kHalf), kHalf);
+}
+
+// Width 16, every beam of the journal: sixteen elements at a time, a tenth of
+// the instructions of byte after byte.
+template <>
+void Split<kVector>(const std::uint8_t* elements, std::size_t count,
+                    std::uint8_t* planes) {
+  Square square;
+  std::size_t i = 0;
+  for (; i + kVector <= count; i += kVector) {
+    std::memcpy(&square, elements + i * kVector, sizeof(square));
+    square = Transpose(square);
+    for (std::size_t k = 0; k < kVector; ++k) {
+      std::memcpy(planes + k * count + i, &square[k], kVector);
+    }
+  }
+  for (; i < count; ++i) {
+    for (std::size_t k = 0; k < kVector; ++k) {
+      planes[k * count + i] = elements[i * kVector + k];
+    }
+  }
+}
+
+template <>
+void Join<kVector>(const std::uint8_t* planes, std::size_t count,
+                   std::uint8_t* elements) {
+  Square square;
+  std::size_t i = 0;
+  for (; i + kVector <= count; i += kVector) {
+    for (std::size_t k = 0; k < kVector; ++k) {
+      std::memcpy(&square[k], planes + k * count + i, kVector);
+    }
+    square = Transpose(square);
+    std::memcpy(elements + i * kVector, &square, sizeof(square));
+  }
+  for (; i < count; ++i) {
+    for (std::size_t k = 0; k < kVector; ++k) {
+      elements[i * kVector + k] = planes[k * count + i];
+    }
+  }
+}
+
+// Memory that is written before it is read: not zeroed.
+class Scratch {
+ public:
+  explicit Scratch(std::size_t size)
+      : size_(size), bytes_(new std::uint8_t[size]) {}
+  std::uint8_t* data() { return bytes_.get(); }
+  std::size_t size() const { return size_; }
+  ByteSpan span() const { return ByteSpan(bytes_.get(), size_); }
+
+ private:
+  std::size_t size_;
+  std::unique_ptr<std::uint8_t[]> bytes_;
+};
+
 void SplitAny(const std::uint8_t* elements, std::size_t count,
               std::size_t width, std::uint8_t* planes) {
   switch (width) {
@@ -99,7 +184,8 @@ void JoinAny(const std::uint8_t* planes, std::size_t count, std::size_t width,
   }
 }
 
-void PutPlane(ByteSpan plane, Bytes& scratch, ByteWriter& writer) {
+// `scratch` holds ZSTD_compressBound(plane.size()).
+void PutPlane(ByteSpan plane, Scratch& scratch, ByteWriter& writer) {
   // memcmp of the plane with itself, shifted by one: all bytes are equal.
   if (std::memcmp(plane.data(), plane.data() + 1, plane.size() - 1) == 0) {
     writer.PutU8(kConstant);
@@ -107,14 +193,13 @@ void PutPlane(ByteSpan plane, Bytes& scratch, ByteWriter& writer) {
     return;
   }
   if (plane.size() >= kMinZstdBytes) {
-    scratch.resize(ZSTD_compressBound(plane.size()));
     const std::size_t size =
         ZSTD_compressCCtx(CompressionContext(), scratch.data(), scratch.size(),
                           plane.data(), plane.size(), kZstdLevel);
     if (ZSTD_isError(size) == 0 && size + 4 < plane.size()) {
       writer.PutU8(kZstd);
       writer.PutVarint(size);
-      writer.PutBytes(ByteSpan(scratch).first(size));
+      writer.PutBytes(scratch.span().first(size));
       return;
     }
   }
@@ -151,12 +236,12 @@ void GetPlane(ByteReader& reader, std::span<std::uint8_t> plane) {
 void PutColumnBytes(const void* elements, std::size_t count, std::size_t width,
                     ByteWriter& writer) {
   if (count == 0) return;
-  Bytes planes(count * width);
+  Scratch planes(count * width);
   SplitAny(static_cast<const std::uint8_t*>(elements), count, width,
            planes.data());
-  Bytes scratch;
+  Scratch scratch(ZSTD_compressBound(count));
   for (std::size_t k = 0; k < width; ++k) {
-    PutPlane(ByteSpan(planes).subspan(k * count, count), scratch, writer);
+    PutPlane(planes.span().subspan(k * count, count), scratch, writer);
   }
 }
 
@@ -173,10 +258,10 @@ void GetColumnBytes(ByteReader& reader, std::size_t count, std::size_t width,
 
 void PutRows(ByteSpan rows, std::size_t width, ByteWriter& writer) {
   if (rows.empty()) return;
-  Bytes planes(rows.size());
+  Scratch planes(rows.size());
   SplitAny(rows.data(), rows.size() / width, width, planes.data());
-  Bytes scratch;
-  PutPlane(planes, scratch, writer);
+  Scratch scratch(ZSTD_compressBound(rows.size()));
+  PutPlane(planes.span(), scratch, writer);
 }
 
 Bytes GetRows(ByteReader& reader, std::size_t count, std::size_t width) {

@@ -33,6 +33,9 @@ static_assert(sizeof(map::Beam) == 16);
 constexpr std::size_t kMaxRowBytes = 4 * kMaxStringBytes;
 constexpr std::size_t kMaxSegmentRowBytes = 64 << 20;
 
+// A segment ends behind the ping that fills it: room for that one's beams.
+constexpr std::size_t kUsualBeams = 1 << 12;
+
 // Ids of a segment, each written once.
 class IdTable {
  public:
@@ -54,6 +57,11 @@ class IdTable {
 
 class SegmentWriter {
  public:
+  // `beams`: how many may come.
+  explicit SegmentWriter(std::size_t beams) {
+    beams_.reserve(std::min(beams, kTargetBeams + kUsualBeams));
+  }
+
   void Add(const JournalRecord& record) {
     if (segment_.record_count == 0) segment_.first_revision = record.revision;
     segment_.last_revision = record.revision;
@@ -271,13 +279,19 @@ absl::Status CheckRecord(const JournalRecord& record) {
 absl::StatusOr<std::vector<JournalSegment>> EncodeJournal(
     std::span<const JournalRecord> records) {
   std::vector<JournalSegment> segments;
-  SegmentWriter writer;
+  std::size_t beams = 0;
+  for (const JournalRecord& record : records) {
+    if (const auto* ping = std::get_if<PingRecord>(&record.event)) {
+      beams += ping->ping.beams.size();
+    }
+  }
+  SegmentWriter writer(beams);
   for (const JournalRecord& record : records) {
     FATHOM_RETURN_IF_ERROR(CheckRecord(record));
     writer.Add(record);
     if (writer.full()) {
       segments.push_back(writer.Finish());
-      writer = SegmentWriter();
+      writer = SegmentWriter(beams);
     }
   }
   if (!writer.empty()) segments.push_back(writer.Finish());

@@ -50,6 +50,19 @@ std::optional<RejectReason> Threshold(const Beam& beam,
   return std::nullopt;
 }
 
+// Whether Threshold passes the beam, in one test without branches; NaN fails
+// it.
+bool Passes(const Beam& beam, const LocalMapOptions& options) {
+  return static_cast<int>(beam.range_m > options.min_range_m) &
+         static_cast<int>(beam.range_m < options.max_range_m) &
+         static_cast<int>(beam.std_m > 0.0f) &
+         static_cast<int>(beam.std_m <= kMaxStdM) &
+         static_cast<int>(beam.depth_m >= kMinDepthM) &
+         static_cast<int>(beam.depth_m <= kMaxDepthM) &
+         static_cast<int>(std::fabs(beam.bearing_rad) <
+                          std::numeric_limits<float>::infinity());
+}
+
 // A prior that may stand in the map: known, finite, a std above 0.
 CellPrior ToCellPrior(const std::optional<DepthEstimate>& estimate) {
   if (!estimate.has_value() || estimate->kind == EvidenceKind::kNone) return {};
@@ -142,10 +155,10 @@ struct LocalMap::State {
   LocalBlock& MutableBlock(BlockIndex index, const PriorSource& prior);
   void FillPrior(BlockIndex index, const PriorSource& prior,
                  LocalBlock& block) const;
-  // False: held back as a gross shoal. `last_m` is the depth of the ping's
-  // accepted beam before, NaN at its first.
+  // False: held back as a gross shoal. `block`: the cell's, mutable. `last_m`:
+  // the depth of the ping's accepted beam before, NaN at its first.
   bool AddSounding(CellIndex cell, const Beam& beam, std::uint32_t time_s,
-                   float last_m, const PriorSource& prior);
+                   float last_m, const PriorSource& prior, LocalBlock& block);
   // Whether the sounding has to wait for a second one; brings in the one that
   // waited if this is the second.
   bool HoldBack(LocalBlock& block, std::size_t k, const Beam& beam,
@@ -257,8 +270,7 @@ bool LocalMap::State::HoldBack(LocalBlock& block, std::size_t k,
 
 bool LocalMap::State::AddSounding(CellIndex cell, const Beam& beam,
                                   std::uint32_t time_s, float last_m,
-                                  const PriorSource& prior) {
-  LocalBlock& block = MutableBlock(LocalGrid::BlockOf(cell), prior);
+                                  const PriorSource& prior, LocalBlock& block) {
   const std::size_t k = LocalGrid::OffsetOf(cell);
   if (grid->options.estimator == EstimatorKind::kAdaptive) {
     // Most soundings are like the beam before and need no look at the cell.
@@ -340,10 +352,16 @@ LocalMap::UpdateResult LocalMap::Update(const Ping& ping,
       grid.frame.NorthAzimuthRad(ping.pose.position);
   const std::uint32_t time_s = ToUnixSeconds(ping.time);
   float last_m = std::numeric_limits<float>::quiet_NaN();
+  // Neighbouring beams fall in few blocks: each is looked up once in a row.
+  // It stays where it is while this view's epoch lasts.
+  LocalBlock* block = nullptr;
+  BlockIndex block_index;
   for (const Beam& beam : ping.beams) {
-    if (const std::optional<RejectReason> bad = Threshold(beam, grid.options)) {
-      result.rejects.Add(*bad);
-      continue;
+    if (!Passes(beam, grid.options)) {
+      if (const auto bad = Threshold(beam, grid.options)) {
+        result.rejects.Add(*bad);
+        continue;
+      }
     }
     const NedPoint obstacle = ObstaclePosition(
         vehicle, BeamOffset(beam.range_m,
@@ -353,7 +371,12 @@ LocalMap::UpdateResult LocalMap::Update(const Ping& ping,
       result.rejects.Add(RejectReason::kOutsideArea);
       continue;
     }
-    if (!state_->AddSounding(cell, beam, time_s, last_m, prior)) {
+    const BlockIndex index = LocalGrid::BlockOf(cell);
+    if (block == nullptr || index != block_index) {
+      block = &state_->MutableBlock(index, prior);
+      block_index = index;
+    }
+    if (!state_->AddSounding(cell, beam, time_s, last_m, prior, *block)) {
       result.rejects.Add(RejectReason::kGated);
       continue;
     }

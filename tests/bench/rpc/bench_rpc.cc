@@ -142,24 +142,26 @@ absl::Status Compare(const Client& fathom, const Client& null, int rounds,
   return absl::OkStatus();
 }
 
+// `only`: the one key to measure; empty: all.
 absl::Status Run(const std::string& server, const std::string& null, int rounds,
-                 int pings) {
+                 int pings, const std::string& only) {
   FATHOM_ASSIGN_OR_RETURN(const auto fathom, Client::Connect(server, {}));
   FATHOM_ASSIGN_OR_RETURN(const auto floor, Client::Connect(null, {}));
   FATHOM_RETURN_IF_ERROR(PrepareScene(*fathom, 2000));
   nlohmann::json report;
-  FATHOM_RETURN_IF_ERROR(Compare(*fathom, *floor, rounds, "unary_p50_ratio",
-                                 "us", UnaryP50Us, report));
-  FATHOM_RETURN_IF_ERROR(Compare(*fathom, *floor, rounds, "unary_rate_ratio",
-                                 "calls/s", UnaryRate, report));
-  FATHOM_RETURN_IF_ERROR(Compare(*fathom, *floor, rounds, "batch_points_ratio",
-                                 "points/s", BatchPoints, report));
-  FATHOM_RETURN_IF_ERROR(Compare(
-      *fathom, *floor, rounds, "ingest_pings_ratio", "pings/s",
-      [pings](const Client& side, int round) {
-        return IngestPings(side, round, pings);
-      },
-      report));
+  const auto compare = [&](const std::string& key, const std::string& unit,
+                           const Measure& measure) {
+    if (!only.empty() && only != key) return absl::OkStatus();
+    return Compare(*fathom, *floor, rounds, key, unit, measure, report);
+  };
+  FATHOM_RETURN_IF_ERROR(compare("unary_p50_ratio", "us", UnaryP50Us));
+  FATHOM_RETURN_IF_ERROR(compare("unary_rate_ratio", "calls/s", UnaryRate));
+  FATHOM_RETURN_IF_ERROR(
+      compare("batch_points_ratio", "points/s", BatchPoints));
+  FATHOM_RETURN_IF_ERROR(compare("ingest_pings_ratio", "pings/s",
+                                 [pings](const Client& side, int round) {
+                                   return IngestPings(side, round, pings);
+                                 }));
   std::cout << report.dump(2) << "\n";
   return absl::OkStatus();
 }
@@ -170,6 +172,7 @@ int Main(int argc, char** argv) {
   std::string null;
   int rounds = 5;
   int pings = 20'000;
+  std::string only;
   app.add_option("--server", server, "fathomd, host:port")->required();
   app.add_option("--null", null, "fathom-null-server, host:port")->required();
   app.add_option("--rounds", rounds, "Rounds of each measure")
@@ -178,8 +181,9 @@ int Main(int argc, char** argv) {
   app.add_option("--pings", pings, "Pings in each round of ingest")
       ->check(CLI::Range(100, 10'000'000))
       ->capture_default_str();
+  app.add_option("--only", only, "Measure this key alone");
   CLI11_PARSE(app, argc, argv);
-  const absl::Status status = Run(server, null, rounds, pings);
+  const absl::Status status = Run(server, null, rounds, pings, only);
   if (!status.ok()) {
     std::cerr << "bench_rpc: " << status.ToString() << "\n";
     return 1;
