@@ -124,6 +124,12 @@ absl::StatusOr<std::optional<v1::ImportPriorResponse>> Send(
     progress.Update(done);
   }
   if (raster.counts().with_depth + raster.counts().land == 0) {
+    if (raster.counts().without_std > 0) {
+      return FileError(absl::InvalidArgumentError(absl::StrFormat(
+          "%s cells have a depth, but none has an uncertainty of its own: say "
+          "how good the chart is with --std-m",
+          CountText(raster.counts().without_std))));
+    }
     return FileError(absl::InvalidArgumentError(
         "no cell in the area has a depth or is land: nothing was imported"));
   }
@@ -240,6 +246,9 @@ void AddPrior(CLI::App& app, Session& session) {
   import->add_option("--crs", f->raster.crs,
                      "Coordinate reference system, e.g. EPSG:32619, instead "
                      "of the file's");
+  import->add_flag("--bag-overview", f->raster.overview_grid,
+                   "Of a variable-resolution BAG, only the coarse overview "
+                   "grid (may hide rocks)");
   import->add_option("--name", f->name,
                      "Name of the chart (default: the file's)");
   import->add_option("--survey-time", f->survey_time,

@@ -1,11 +1,12 @@
 // Charts in: any raster that GDAL reads, as blocks of depth, std and land on a
 // regular grid of WGS 84 latitude and longitude (a DepthTile of the contract).
 //
-// Grid. A north-up raster in geographic coordinates keeps its own cells, one
-// for one. Any other one is read at the middle of cells as long and as wide
-// as its own (at its middle latitude), each taking the source cell that it
-// falls into; no value is ever interpolated. Longitudes may run 0 to 360 or
-// cross the antimeridian.
+// Grid. A north-up raster in geographic coordinates on WGS 84 keeps its own
+// cells, one for one. Any other one is read at the middles of cells a little
+// smaller than its own, each taking the source cell that it falls into: so
+// fine that every source cell is taken at least once, however it is rotated
+// (raster_source.h), so that no lone rock falls between two middles. No value
+// is ever interpolated. Longitudes may run 0 to 360 or cross the antimeridian.
 //
 // Depth. Values are turned to metres below the datum, positive down; whether
 // they are elevations or depths is stated by the caller or decided from the
@@ -17,7 +18,11 @@
 // Land: cells higher than land_above_m. Neither ever becomes depth 0.
 //
 // Std: one sigma, from a number, from a band, or from a band that states 95 %
-// (divided by 1.96). A raster without any is refused.
+// (divided by 1.96): as the caller says, or as a BAG's metadata says, else one
+// sigma is assumed, and summary() says which. A raster without any is refused.
+//
+// Memory: bounded by the block read and GDAL's cache (raster_open.h), whatever
+// the size of the raster. Empty parts of sparse files are not read.
 //
 // Thread safety: one thread at a time. GDAL's errors and exceptions are caught
 // here; every error returned is marked as the file's fault.
@@ -48,7 +53,7 @@ inline constexpr double kSigmasOf95Percent = 1.959964;
 inline constexpr double kMaxPlausibleM = 12'000;
 
 struct RasterOptions {
-  std::string path;
+  std::string path = "";
   // 1-based; 0: the one described as elevation or depth, else the first.
   int depth_band = 0;
   Positive positive = Positive::kAuto;
@@ -60,6 +65,8 @@ struct RasterOptions {
   bool std_is_95_percent = false;
   // Higher than this above the datum is land, metres.
   double land_above_m = 0;
+  // Of a variable-resolution BAG, only the coarse overview grid.
+  bool overview_grid = false;
   // "EPSG:32619": instead of what the file says, or where it says nothing.
   std::string crs = "";
   // Leave cells out that lie outside.
@@ -93,9 +100,9 @@ class DepthRaster {
  public:
   // Opens and looks at a sample of the values. Errors: NOT_FOUND (no such
   // file, or no format that GDAL knows); INVALID_ARGUMENT (no coordinate
-  // reference system, no such band, no std, every cell nodata, sign not to be
-  // told, nothing inside `clip`; each says which flag would help); DATA_LOSS
-  // (damaged or cut off).
+  // reference system, no such band, no std, every cell nodata, every cell
+  // land, sign not to be told, nothing inside `clip`; each says which flag
+  // would help); DATA_LOSS (damaged or cut off).
   static absl::StatusOr<std::unique_ptr<DepthRaster>> Open(
       const RasterOptions& options);
 
@@ -105,9 +112,12 @@ class DepthRaster {
   virtual const LonLatGrid& grid() const = 0;
   virtual const RasterSummary& summary() const = 0;
   virtual const RasterCounts& counts() const = 0;
+  // The files that the raster is read from.
+  virtual std::vector<std::string> files() const = 0;
 
   // Reads a block of grid(). Land cells have depth NaN; unknown ones too, and
-  // land 0. `land` is empty if there is none. Errors: DATA_LOSS.
+  // land 0. `land` is empty if there is none; depth_m is empty too where the
+  // file stores nothing at all. Errors: DATA_LOSS.
   virtual absl::StatusOr<v1::DepthTile> Read(const GridBlock& block) = 0;
 };
 

@@ -63,6 +63,16 @@ absl::StatusOr<RasterBand> RasterBand::Open(GDALDataset& dataset, int number,
   return band;
 }
 
+bool RasterBand::Empty(const RasterWindow& window) const {
+  const GdalErrors errors;
+  double percent = 0;
+  const int status = band_->GetDataCoverageStatus(
+      window.column, window.row, window.columns, window.rows, 0, &percent);
+  return (status & GDAL_DATA_COVERAGE_STATUS_UNIMPLEMENTED) == 0 &&
+         (status & GDAL_DATA_COVERAGE_STATUS_EMPTY) != 0 &&
+         (status & GDAL_DATA_COVERAGE_STATUS_DATA) == 0 && declares_nodata_;
+}
+
 absl::StatusOr<BandCells> RasterBand::Read(const RasterWindow& window,
                                            int columns, int rows,
                                            double limit_m) const {

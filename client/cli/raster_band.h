@@ -46,6 +46,10 @@ class RasterBand {
   std::string description() const { return band_->GetDescription(); }
   GDALRasterBand& gdal() const { return *band_; }
 
+  // Whether the file says that nothing at all is stored in `window` (sparse
+  // GeoTIFF and VRT); false where it cannot tell.
+  bool Empty(const RasterWindow& window) const;
+
   // Reads `window`, thinned to columns x rows cells; values beyond +-limit_m
   // are none. Errors: DATA_LOSS (damaged or cut off).
   absl::StatusOr<BandCells> Read(const RasterWindow& window, int columns,

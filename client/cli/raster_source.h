@@ -1,5 +1,13 @@
 // Where each place lies in an open raster: its grid on the ellipsoid and the
 // way from longitude and latitude to pixel and line. GDAL side of raster.h.
+//
+// The grid of a raster that is not north-up on WGS 84. Its cells are as wide
+// and high as the source's own at the middle, times the largest k <= 1 for
+// which a cell of the grid, laid parallel to the meridian, fits inside every
+// source cell, which is a parallelogram in longitude and latitude. Any such
+// parallelogram then holds a middle of the grid: each source cell is taken at
+// least once. For UTM k is 0.93 to 1, for any rotation of square cells at
+// least 1 / sqrt(2).
 // Thread safety: one thread at a time.
 
 #ifndef FATHOM_CLIENT_CLI_RASTER_SOURCE_H_
@@ -35,7 +43,14 @@ class RasterSource {
   RasterSource() = default;
   absl::Status ReadReference(GDALDataset& dataset, const std::string& crs,
                              std::vector<std::string>& remarks);
+  // The raster's own cells, if it is north-up in degrees; false if it is not.
+  absl::StatusOr<bool> KeepOwnGrid();
   absl::Status PlanGrid();
+  // From pixel and line to unwrapped longitude and latitude, in place; NaN
+  // where the projection does not know the place.
+  void FromPixels(std::vector<double>& x, std::vector<double>& y) const;
+  // Whether the pole (+1 north, -1 south) lies inside.
+  bool HoldsPole(int sign) const;
 
   OGRSpatialReference reference_;
   std::string crs_name_;

@@ -106,6 +106,12 @@ class Writer {
 
  private:
   absl::Status Validate() const {
+    std::error_code error;
+    if (const auto type = std::filesystem::status(options_.path, error).type();
+        type != std::filesystem::file_type::not_found &&
+        type != std::filesystem::file_type::regular) {
+      return NotWritable("it is a folder or a device");
+    }
     const auto& bands = options_.bands;
     if (bands.size() < 2 || bands[0] != ExportBand::kDepth ||
         bands[1] != ExportBand::kUncertainty) {

@@ -436,28 +436,5 @@ TEST(SharedRasters, BagAndTiffOfF00788HoldIdenticalCells) {
   }
 }
 
-TEST(SharedRasters, EverySampleReadsOrSaysWhyNot) {
-  for (const char* name : {"bathymetry", "import_cases"}) {
-    const std::filesystem::path folder =
-        std::filesystem::path(FATHOM_SHARED_DATA_DIR) / name;
-    if (!std::filesystem::exists(folder)) {
-      GTEST_SKIP() << "no shared survey data at " << folder;
-    }
-    for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-      const auto raster = DepthRaster::Open(
-          {.path = entry.path(), .positive = Positive::kUp, .std_m = 1});
-      if (!raster.ok()) {
-        EXPECT_EQ(ExitCodeOf(raster.status()), ExitCode::kBadFile);
-        EXPECT_THAT(std::string(raster.status().message()),
-                    HasSubstr(entry.path().filename().string()));
-        continue;
-      }
-      for (const GridBlock& block : CutIntoBlocks((*raster)->grid(), 65'536)) {
-        ASSERT_THAT((*raster)->Read(block), IsOk()) << entry.path();
-      }
-    }
-  }
-}
-
 }  // namespace
 }  // namespace fathom::client::cli

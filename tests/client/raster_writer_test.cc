@@ -233,6 +233,9 @@ TEST_F(RasterWriterTest, WhatCannotBeWrittenLeavesWhatWasThere) {
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("--out")));
   EXPECT_EQ(ExitCodeOf(status), ExitCode::kBadFile);
   EXPECT_THAT(
+      WriteRaster({.region = region_}, {.path = folder_}),
+      StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("folder")));
+  EXPECT_THAT(
       WriteRaster({.region = region_},
                   {.path = path,
                    .format = ExportFormat::kBag,
