@@ -29,6 +29,7 @@ std::string ServiceConfig() {
       {"fathom.v1.ObstacleService", "ListContacts"},
       {"fathom.v1.ObstacleService", "GetContactHistory"},
       {"fathom.v1.IngestService", "ReportContacts"},
+      {"fathom.v1.MissionService", "GetImport"},
       {"fathom.v1.MissionService", "GetMissionStatus"},
       {"fathom.v1.MissionService", "VerifyMission"},
   };
@@ -237,6 +238,17 @@ absl::StatusOr<v1::DropContactResponse> Client::DropContact(
   return Call<v1::DropContactResponse>(*mission_,
                                        &v1::MissionService::Stub::DropContact,
                                        request, options_.call_timeout);
+}
+
+absl::StatusOr<std::uint64_t> Client::GetImport(
+    const std::string& import_id) const {
+  v1::GetImportRequest request;
+  request.set_import_id(import_id);
+  FATHOM_ASSIGN_OR_RETURN(const v1::GetImportResponse response,
+                          Call<v1::GetImportResponse>(
+                              *mission_, &v1::MissionService::Stub::GetImport,
+                              request, options_.call_timeout));
+  return response.tiles();
 }
 
 absl::StatusOr<std::unique_ptr<PriorWriter>> Client::ImportPrior(

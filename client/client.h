@@ -143,6 +143,9 @@ class Client {
   absl::StatusOr<v1::DropContactResponse> DropContact(
       const v1::DropContactRequest& request) const;
 
+  // Tiles of the import `import_id` that the mission holds; 0: none.
+  absl::StatusOr<std::uint64_t> GetImport(const std::string& import_id) const;
+
   // Begins to load a chart; see prior_writer.h.
   absl::StatusOr<std::unique_ptr<PriorWriter>> ImportPrior(
       const v1::PriorHeader& header) const;

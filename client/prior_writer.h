@@ -5,6 +5,10 @@
 //   for (...) { FATHOM_RETURN_IF_ERROR(writer->Write(tile)); }
 //   FATHOM_ASSIGN_OR_RETURN(v1::ImportPriorResponse done, writer->Finish());
 //
+// With header.import_id it may break off anywhere: Client::GetImport tells
+// which tile the mission holds last; begin again with header.first_tile one
+// above it.
+//
 // Thread safety: one thread at a time.
 
 #ifndef FATHOM_CLIENT_PRIOR_WRITER_H_
@@ -37,7 +41,8 @@ class PriorWriter {
 
   // Sends one tile; waits while the server's window is full. An error is the
   // one that ended the import (INVALID_ARGUMENT with the field's path,
-  // RESOURCE_EXHAUSTED, ...): what was sent before may have been applied.
+  // RESOURCE_EXHAUSTED, ...): what was sent before may have been applied
+  // (with an import_id GetImport tells).
   absl::Status Write(const v1::DepthTile& tile);
 
   // Ends the chart and waits for the server's summary. Errors: as Write;

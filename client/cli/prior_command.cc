@@ -9,6 +9,7 @@
 #include "base/status_macros.h"
 #include "client/cli/exit_code.h"
 #include "client/cli/geo_math.h"
+#include "client/cli/import_id.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/raster.h"
 #include "client/cli/session.h"
@@ -31,6 +32,7 @@ struct ImportFlags {
   bool merge = false;
   bool no_clip = false;
   bool dry_run = false;
+  bool again = false;
 };
 
 nlohmann::ordered_json SummaryJson(const DepthRaster& raster) {
@@ -102,40 +104,79 @@ bool SaysSomething(const RasterCounts& before, const RasterCounts& after) {
   return after.with_depth > before.with_depth || after.land > before.land;
 }
 
-// Sends every block that says something; the writer is opened with the first.
-// Without a client nothing is sent.
-absl::StatusOr<std::optional<v1::ImportPriorResponse>> Send(
-    const Client* client, const v1::PriorHeader& header,
-    std::int64_t max_tile_cells, DepthRaster& raster) {
+// What an import did.
+struct Sent {
+  // None: nothing had to be sent.
+  std::optional<v1::ImportPriorResponse> response = std::nullopt;
+  // Tiles of the chart, and those of them that the mission held before.
+  std::uint64_t tiles = 0;
+  std::uint64_t tiles_held = 0;
+};
+
+// What broke off an import, with what to do: the tiles that became durable
+// are not sent again.
+absl::Status BrokenOff(const absl::Status& status) {
+  if (ExitCodeOf(status) != ExitCode::kUnreachable) return status;
+  return absl::Status(
+      status.code(),
+      absl::StrFormat("%s; the import broke off: run the same command again "
+                      "and it goes on where the mission stands",
+                      std::string(status.message())));
+}
+
+// Sends every block that says something and that the mission does not hold
+// yet; the writer is opened with the first. Without a client nothing is sent.
+absl::StatusOr<Sent> Send(const Client* client, v1::PriorHeader header,
+                          std::int64_t max_tile_cells, DepthRaster& raster) {
+  Sent sent;
+  if (client != nullptr) {
+    FATHOM_ASSIGN_OR_RETURN(sent.tiles_held,
+                            client->GetImport(header.import_id()));
+    if (sent.tiles_held > 0) {
+      Note(
+          absl::StrFormat("resume     the mission holds the first %s tiles "
+                          "of this chart: they are not sent again",
+                          CountText(sent.tiles_held)));
+    }
+    header.set_first_tile(sent.tiles_held + 1);
+  }
   std::unique_ptr<PriorWriter> writer;
   ProgressBar progress("import", "cells", header.expected_cells());
   std::uint64_t done = 0;
-  for (const GridBlock& block :
-       CutIntoBlocks(raster.grid(), std::min(kTileCells, max_tile_cells))) {
+  for (const GridBlock& block : CutIntoBlocks(raster.grid(), max_tile_cells)) {
     const RasterCounts before = raster.counts();
     FATHOM_ASSIGN_OR_RETURN(const v1::DepthTile tile, raster.Read(block));
-    if (client != nullptr && SaysSomething(before, raster.counts())) {
-      if (writer == nullptr) {
-        FATHOM_ASSIGN_OR_RETURN(writer, client->ImportPrior(header));
+    if (SaysSomething(before, raster.counts())) {
+      ++sent.tiles;
+      if (client != nullptr && sent.tiles > sent.tiles_held) {
+        if (writer == nullptr) {
+          FATHOM_ASSIGN_OR_RETURN(writer, client->ImportPrior(header));
+        }
+        const absl::Status written = writer->Write(tile);
+        if (!written.ok()) return BrokenOff(written);
       }
-      FATHOM_RETURN_IF_ERROR(writer->Write(tile));
     }
     done += static_cast<std::uint64_t>(block.rows * block.columns);
     progress.Update(done);
   }
-  if (raster.counts().with_depth + raster.counts().land == 0) {
-    if (raster.counts().without_std > 0) {
-      return FileError(absl::InvalidArgumentError(absl::StrFormat(
-          "%s cells have a depth, but none has an uncertainty of its own: say "
-          "how good the chart is with --std-m",
-          CountText(raster.counts().without_std))));
-    }
+  progress.Finish();
+  const RasterCounts& counts = raster.counts();
+  if (counts.with_depth + counts.land == 0) {
     return FileError(absl::InvalidArgumentError(
-        "no cell in the area has a depth or is land: nothing was imported"));
+        counts.without_std > 0
+            ? absl::StrFormat("%s cells have a depth, but none has an "
+                              "uncertainty of its own: say how good the chart "
+                              "is with --std-m",
+                              CountText(counts.without_std))
+            : "no cell in the area has a depth or is land: nothing was "
+              "imported"));
   }
-  if (writer == nullptr) return std::optional<v1::ImportPriorResponse>();
-  FATHOM_ASSIGN_OR_RETURN(v1::ImportPriorResponse response, writer->Finish());
-  return std::make_optional(std::move(response));
+  if (writer != nullptr) {
+    absl::StatusOr<v1::ImportPriorResponse> response = writer->Finish();
+    if (!response.ok()) return BrokenOff(response.status());
+    sent.response = *std::move(response);
+  }
+  return sent;
 }
 
 std::string CountsText(const RasterCounts& c) {
@@ -151,6 +192,44 @@ std::string CountsText(const RasterCounts& c) {
                           CountText(c.without_std));
   }
   return text;
+}
+
+void PrintOutcome(const Session& session, const v1::PriorHeader& header,
+                  const DepthRaster& raster, const Sent& sent, bool dry_run) {
+  const bool already = !dry_run && !sent.response.has_value();
+  if (session.json) {
+    nlohmann::ordered_json document;
+    document["chart"] = SummaryJson(raster);
+    document["chart"]["tiles"] = sent.tiles;
+    if (!dry_run) {
+      document["import_id"] = header.import_id();
+      document["tiles_held_before"] = sent.tiles_held;
+      document["already_loaded"] = already;
+    }
+    if (sent.response.has_value()) document["import"] = ToJson(*sent.response);
+    PrintJson(document);
+    return;
+  }
+  Print("chart      " + CountsText(raster.counts()) + "\n");
+  if (dry_run) {
+    Print("dry run    nothing was sent\n");
+  } else if (already) {
+    Print(
+        "unchanged  the mission holds all of this chart already: nothing was "
+        "sent (--again loads it anew)\n");
+  } else {
+    const v1::ImportPriorResponse& response = *sent.response;
+    Print(absl::StrFormat(
+        "imported   %s tiles%s; %s cells lie outside the mission; global map "
+        "%s -> %s leaves; revision %d\n",
+        CountText(response.tiles()),
+        sent.tiles_held == 0
+            ? ""
+            : absl::StrFormat(" (%s were there)", CountText(sent.tiles_held)),
+        CountText(response.cells_outside()),
+        CountText(response.leaves_before()), CountText(response.leaves_after()),
+        response.map_revision()));
+  }
 }
 
 absl::Status Import(const Session& session, ImportFlags flags) {
@@ -179,28 +258,25 @@ absl::Status Import(const Session& session, ImportFlags flags) {
   FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<DepthRaster> raster,
                           DepthRaster::Open(flags.raster));
   NoteDecisions(flags.raster.path, *raster);
-  FATHOM_ASSIGN_OR_RETURN(const v1::PriorHeader header,
+  FATHOM_ASSIGN_OR_RETURN(v1::PriorHeader header,
                           Header(session, flags, *raster));
-  FATHOM_ASSIGN_OR_RETURN(const std::optional<v1::ImportPriorResponse> response,
-                          Send(client.get(), header, max_tile_cells, *raster));
-  if (session.json) {
-    nlohmann::ordered_json document;
-    document["chart"] = SummaryJson(*raster);
-    if (response.has_value()) document["import"] = ToJson(*response);
-    PrintJson(document);
-    return absl::OkStatus();
+  const std::int64_t tile_cells = std::min(kTileCells, max_tile_cells);
+  if (client != nullptr) {
+    FATHOM_ASSIGN_OR_RETURN(
+        std::string id,
+        ImportId(flags.raster, raster->files(), header, tile_cells));
+    if (flags.again) {
+      // Another name: the mission does not know it.
+      Digest digest;
+      digest.AddField(id);
+      digest.AddField(FormatTime(session.Now()));
+      id = "prior-" + digest.Hex();
+    }
+    header.set_import_id(id);
   }
-  Print("chart      " + CountsText(raster->counts()) + "\n");
-  if (response.has_value()) {
-    Print(absl::StrFormat(
-        "imported   %s tiles; %s cells lie outside the mission; global map %s "
-        "-> %s leaves; revision %d\n",
-        CountText(response->tiles()), CountText(response->cells_outside()),
-        CountText(response->leaves_before()),
-        CountText(response->leaves_after()), response->map_revision()));
-  } else {
-    Print("dry run    nothing was sent\n");
-  }
+  FATHOM_ASSIGN_OR_RETURN(const Sent sent,
+                          Send(client.get(), header, tile_cells, *raster));
+  PrintOutcome(session, header, *raster, sent, flags.dry_run);
   return absl::OkStatus();
 }
 
@@ -258,12 +334,19 @@ void AddPrior(CLI::App& app, Session& session) {
                    "of replacing them; measurements are never replaced");
   import->add_flag("--no-clip", f->no_clip,
                    "Send all of it, also what lies outside the mission");
+  import->add_flag("--again", f->again,
+                   "Load it anew although the mission holds it already (as "
+                   "after another chart replaced it)");
   import->add_flag("--dry-run", f->dry_run,
                    "Read it and say what would be sent, without a server");
   import->footer(
       "\nThe file's vertical datum must be the mission's (fathom mission "
       "info). Land stays\nland and nodata stays unknown: neither becomes a "
-      "depth.\n"
+      "depth. The uncertainty of a BAG is\nread as its metadata says (product "
+      "uncertainty: 95 %); --std-band and --std-95-band\noverrule it.\n"
+      "\nAn import that broke off is resumed by the same command: the chart's "
+      "content and the\noptions name it. Loading the same chart twice changes "
+      "nothing.\n"
       "\nExamples:\n"
       "  fathom prior import etopo5.cdf --positive up --std-m 10\n"
       "  fathom prior import F00788_SR_8m.bag --std-95-band 2\n"

@@ -180,8 +180,16 @@ TEST_F(CliTest, ChartIsClippedToTheMissionAndLandIsSentAsLand) {
   std::ofstream(path) << "ncols 4\nnrows 2\nxllcorner -90\nyllcorner 30\n"
                          "cellsize 10\nNODATA_value -9999\n"
                          "-1 -2 25 -4\n-5 -6 -9999 -8\n";
-  const Outcome outcome = Run("--json prior import " + path +
-                              " --positive up --std-m 3 --crs EPSG:4326");
+  const std::string command = "--json prior import " + path +
+                              " --positive up --std-m 3 --crs EPSG:4326";
+  const Outcome outcome = Run(command);
+  EXPECT_EQ(server_.header.first_tile(), 1u);
+  // A mission that holds all of it is sent nothing.
+  server_.tiles_held = 1;
+  const Outcome again = Run(command);
+  EXPECT_EQ(again.code, 0);
+  EXPECT_EQ(Json(again).at("already_loaded"), true);
+  EXPECT_EQ(server_.calls("ImportPrior"), 1);
   std::filesystem::remove_all(folder);
   ASSERT_EQ(outcome.code, 0) << outcome.out;
   const nlohmann::json chart = Json(outcome).at("chart");
@@ -197,6 +205,7 @@ TEST_F(CliTest, ChartIsClippedToTheMissionAndLandIsSentAsLand) {
   EXPECT_EQ(tile.depth_m(2), 6);
   EXPECT_EQ(tile.std_m(0), 3);
   EXPECT_EQ(server_.header.name(), "chart.asc");
+  EXPECT_EQ(server_.header.import_id(), Json(again).at("import_id"));
   EXPECT_TRUE(server_.header.replace());
 }
 

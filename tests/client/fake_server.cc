@@ -287,6 +287,13 @@ grpc::Status FakeServer::GetMissionStatus(grpc::ServerContext*,
   return Enter("GetMissionStatus");
 }
 
+grpc::Status FakeServer::GetImport(grpc::ServerContext*,
+                                   const v1::GetImportRequest*,
+                                   v1::GetImportResponse* response) {
+  response->set_tiles(tiles_held);
+  return Enter("GetImport");
+}
+
 grpc::Status FakeServer::ImportPrior(
     grpc::ServerContext*, grpc::ServerReader<v1::ImportPriorRequest>* reader,
     v1::ImportPriorResponse* response) {

@@ -100,6 +100,8 @@ class FakeServer final : public v1::ObstacleService::Service,
   // Taken by ImportPrior.
   std::vector<v1::DepthTile> tiles;
   v1::PriorHeader header;
+  // Answered by GetImport.
+  std::uint64_t tiles_held = 0;
   // Answered by GetMissionStatus.
   v1::GetMissionStatusResponse mission;
   // Requests as they came.
@@ -130,6 +132,9 @@ class FakeServer final : public v1::ObstacleService::Service,
   grpc::Status GetMissionStatus(
       grpc::ServerContext* context, const v1::GetMissionStatusRequest* request,
       v1::GetMissionStatusResponse* response) override;
+  grpc::Status GetImport(grpc::ServerContext* context,
+                         const v1::GetImportRequest* request,
+                         v1::GetImportResponse* response) override;
   grpc::Status ImportPrior(grpc::ServerContext* context,
                            grpc::ServerReader<v1::ImportPriorRequest>* reader,
                            v1::ImportPriorResponse* response) override;

@@ -4,11 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <set>
 #include <sstream>
 
 #include "client/cli/arguments.h"
 #include "client/cli/exit_code.h"
 #include "client/cli/geo_math.h"
+#include "client/cli/import_id.h"
 #include "client/cli/points_file.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/text.h"
@@ -207,6 +209,34 @@ TEST(ValueScale, CoversTheQuantilesAndSkipsNan) {
   EXPECT_GT(flat.high(), 3);
   // Nothing known.
   EXPECT_EQ(ValueScale::Covering({}, 0, 1, ValueScale::Kind::kRoot).high(), 1);
+}
+
+TEST(ImportId, DigestTellsEveryBitAndOrderApart) {
+  const auto of = [](const std::vector<std::string>& fields) {
+    Digest digest;
+    for (const std::string& field : fields) digest.AddField(field);
+    return digest.Hex();
+  };
+  EXPECT_EQ(of({"abc"}), of({"abc"}));
+  std::set<std::string> seen = {of({}),
+                                of({""}),
+                                of({"a"}),
+                                of({"b"}),
+                                of({"ab", "c"}),
+                                of({"a", "bc"}),
+                                of({"abc"}),
+                                of({"c", "ab"}),
+                                of({std::string(1, '\0')}),
+                                of({std::string(8, '\0')})};
+  EXPECT_EQ(seen.size(), 10u);
+  // Each single bit of 1000 bytes.
+  std::string bytes(1000, 'x');
+  for (std::size_t bit = 0; bit < 8000; ++bit) {
+    bytes[bit / 8] = static_cast<char>(bytes[bit / 8] ^ (1 << (bit % 8)));
+    seen.insert(of({bytes}));
+    bytes[bit / 8] = static_cast<char>(bytes[bit / 8] ^ (1 << (bit % 8)));
+  }
+  EXPECT_EQ(seen.size(), 8010u);
 }
 
 }  // namespace

@@ -8,8 +8,9 @@ import shutil
 import subprocess
 import unittest
 
-from commands_test import BAD_FILE, OK, REFUSED, USAGE, run
-from live_server import DEADLINE_S, FATHOM, LiveTest, obstacle
+from commands_test import BAD_FILE, OK, REFUSED, UNREACHABLE, USAGE, run
+from live_server import (DEADLINE_S, FATHOM, LiveTest, mission, obstacle,
+                         wait_until)
 
 # 30 x 24 cells of 0.001 degrees, a slope with a hill, a strip of land in the
 # south and a hole of nodata.
@@ -139,6 +140,111 @@ class Export(LiveTest):
         left = [p.name for p in pathlib.Path(self.folder).iterdir()
                 if "part" in p.name]
         self.assertEqual(left, [])
+
+
+class Import(LiveTest):
+    """An import that breaks off goes on where the mission stands."""
+
+    # 700 x 700 cells of about 8 m: tiles of 256 x 256, nine in all.
+    SIDE = 700
+
+    def setUp(self):
+        super().setUp()
+        self.chart = self.folder / "large.asc"
+        lines = [f"ncols {self.SIDE}", f"nrows {self.SIDE}",
+                 "xllcorner -71.43", "yllcorner 41.47", "cellsize 0.0001"]
+        for row in range(self.SIDE):
+            lines.append(" ".join(
+                str(-10 - (row * 7 + column * 3) % 50 / 10)
+                for column in range(self.SIDE)))
+        self.chart.write_text("\n".join(lines) + "\n")
+        self.arguments = ["--json", "prior", "import", str(self.chart),
+                          "--crs", "EPSG:4326", "--positive", "up",
+                          "--std-m", "2"]
+
+    def load(self, server, *more, code=OK):
+        done = run(FATHOM, *self.arguments, *more, server=server)
+        self.assertEqual(done.returncode, code, done.stdout + done.stderr)
+        return json.loads(done.stdout), done.stderr
+
+    def whole(self):
+        """The digest that an undisturbed import gives, and its tiles."""
+        with self.new_mission(name="whole.fathom") as server:
+            told, _ = self.load(server)
+            return server.status(digest=True).map_digest, told
+
+    def test_the_same_chart_again_changes_nothing_and_says_so(self):
+        with self.new_mission() as server:
+            first, _ = self.load(server)
+            self.assertFalse(first["already_loaded"])
+            before = server.status(digest=True)
+            second, _ = self.load(server)
+            self.assertTrue(second["already_loaded"])
+            self.assertEqual(second["tiles_held_before"],
+                             first["chart"]["tiles"])
+            self.assertNotIn("import", second)
+            # Under another name it is the same chart.
+            moved = self.folder / "moved.asc"
+            shutil.copy(self.chart, moved)
+            self.arguments[3] = str(moved)
+            third, _ = self.load(server)
+            self.assertEqual(third["import_id"], first["import_id"])
+            after = server.status(digest=True)
+            self.assertEqual(after.map_digest, before.map_digest)
+            self.assertEqual(after.stamp.map_revision,
+                             before.stamp.map_revision)
+            # Another option is another import, and so is --again.
+            other, _ = self.load(server, "--land-above", "1")
+            self.assertNotEqual(other["import_id"], first["import_id"])
+            again, _ = self.load(server, "--again")
+            self.assertFalse(again["already_loaded"])
+            self.assertEqual(again["tiles_held_before"], 0)
+
+    def test_a_killed_client_is_resumed(self):
+        digest, told = self.whole()
+        with self.new_mission() as server:
+            client = subprocess.Popen(
+                [FATHOM, *self.arguments],
+                env={"FATHOM_SERVER": server.address}, text=True,
+                stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+            # Killed as soon as a tile is in the map.
+            wait_until(lambda: client.poll() is not None
+                       or server.status().global_map.leaves > 0,
+                       "the first tile")
+            client.kill()
+            client.communicate(timeout=DEADLINE_S)
+            wait_until(lambda: self.held(server, told) > 0, "tiles held")
+            resumed, notes = self.load(server)
+            if resumed["tiles_held_before"] < told["chart"]["tiles"]:
+                self.assertIn("resume", notes)
+            self.assertGreater(resumed["tiles_held_before"], 0)
+            self.assertEqual(server.status(digest=True).map_digest, digest)
+
+    def test_a_killed_server_is_resumed(self):
+        digest, told = self.whole()
+        server = self.new_mission()
+        client = subprocess.Popen(
+            [FATHOM, *self.arguments], env={"FATHOM_SERVER": server.address},
+            text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        wait_until(lambda: client.poll() is not None
+                   or server.status().global_map.leaves > 0, "the first tile")
+        server.kill()
+        _, stderr = client.communicate(timeout=2 * DEADLINE_S)
+        if client.returncode != OK:
+            self.assertEqual(client.returncode, UNREACHABLE, stderr)
+            self.assertIn("run the same command again", stderr)
+        with self.reopen() as server:
+            held = self.held(server, told)
+            resumed, _ = self.load(server)
+            self.assertEqual(resumed["tiles_held_before"], held)
+            self.assertEqual(resumed["chart"]["tiles"],
+                             told["chart"]["tiles"])
+            self.assertEqual(server.status(digest=True).map_digest, digest)
+
+    def held(self, server, told):
+        return server.mission.GetImport(
+            mission.GetImportRequest(import_id=told["import_id"]),
+            timeout=DEADLINE_S).tiles
 
 
 if __name__ == "__main__":
