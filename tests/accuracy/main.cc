@@ -1,6 +1,6 @@
 // Prints the accuracy figures of the static map and writes them as JSON.
 //
-//   accuracy --data DIR [--seeds N] [--only FIGURE] --out FILE
+//   accuracy --data DIR [--seeds N] [--only FIGURE] [--check] --out FILE
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -10,6 +10,7 @@
 #include <map>
 
 #include "tests/accuracy/figures.h"
+#include "tests/accuracy/limits.h"
 
 namespace fathom::accuracy {
 namespace {
@@ -68,12 +69,14 @@ int Run(int argc, char** argv) {
   std::string data;
   std::string out;
   std::string only;
+  bool check = false;
   int seeds = 20;
   app.add_option("--data", data, "folder of the test data")->required();
   app.add_option("--out", out, "JSON file to write")->required();
   app.add_option("--seeds", seeds, "surveys per figure")
       ->check(CLI::Range(1, 1000));
   app.add_option("--only", only, "one figure by its name");
+  app.add_flag("--check", check, "exit 1 if a figure misses its limit");
   CLI11_PARSE(app, argc, argv);
 
   const std::vector<Scene> scenes = Scenes(data);
@@ -89,6 +92,11 @@ int Run(int argc, char** argv) {
              return HazardFigures(data + "/charts", scenes.front().terrain,
                                   seeds);
            }},
+          {"recorded",
+           [&] {
+             return RecordedFigures(
+                 data + "/soundings/r2sonic2026_sf_every8th_ping.csv.gz");
+           }},
       };
   nlohmann::json report = {{"seeds", seeds}};
   for (const auto& [name, make] : figures) {
@@ -99,7 +107,8 @@ int Run(int argc, char** argv) {
   std::filesystem::create_directories(
       std::filesystem::absolute(out).parent_path());
   std::ofstream(out) << report.dump(2) << "\n";
-  return 0;
+  const int missed = CheckLimits(report);
+  return check && missed > 0 ? 1 : 0;
 }
 
 }  // namespace

@@ -48,15 +48,16 @@ TEST(ReadSmoothed, BetweenTwoIsSurerThanBesideTwo) {
 TEST(ReadSmoothed, TwoExactNeighboursFollowTheVariogram) {
   // 1 mm soundings, 1000 a cell, 2 m apart, one cell to either side: R by the
   // pair 4 / 2^1.5 = 1.41421; the guess 0.09 weighs half a pair beside the one
-  // step: (1.41421 + 0.5 * 0.09) / 1.5 = 0.97281, doubled for a single step:
-  // 1.94562. tau^2 = 0.38912, a thousandth of it in each mean.
+  // step: (1.41421 + 0.5 * 0.09) / 1.5 = 0.97281. One step tells nearly
+  // nothing: times 17, R = 16.5378. tau^2 = 3.30756, a thousandth of it in each
+  // mean.
   const std::vector<MeasuredNear> near = {Near(1, 0, 30.0f, 0.001f, 1000),
                                           Near(-1, 0, 32.0f, 0.001f, 1000)};
   const DepthEstimate got = *ReadSmoothed(near, 0.8, 10.0);
   EXPECT_NEAR(got.depth_m, 31.0f, 1e-4);
-  // Error: R - 2 * 1/4 * R 2^1.5 / 2 ... = R (1 - 0.25 * 2.82843) = 0.56984,
-  // and 2 * 1/4 * 0.00038912. (0.56984 + 0.00019 + 0.38912) / 0.8 = 1.19895.
-  EXPECT_NEAR(got.std_m, std::sqrt(1.19895), 2e-3);
+  // Error: R - 1/4 R 2^1.5 = 0.29289 R = 4.84380, and 2 * 1/4 * 0.00331.
+  // (4.84380 + 0.00165 + 3.30756) / 0.8 = 10.1913.
+  EXPECT_NEAR(got.std_m, std::sqrt(10.1913), 2e-3);
 }
 
 TEST(ReadSmoothed, NothingNearOrNoScaleGivesNothing) {

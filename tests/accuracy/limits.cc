@@ -1,0 +1,127 @@
+#include "tests/accuracy/limits.h"
+
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+namespace fathom::accuracy {
+namespace {
+
+// The worst of what it was offered, and whether all stayed within.
+class Limit {
+ public:
+  Limit(std::string what, double most) : what_(std::move(what)), most_(most) {}
+
+  void Offer(double value, const std::string& where) {
+    if (offered_ && value <= worst_) return;
+    offered_ = true;
+    worst_ = value;
+    where_ = where;
+  }
+  // Prints the line; 1 if missed.
+  int Report() const {
+    if (!offered_) return 0;
+    const bool missed = !(worst_ <= most_);
+    std::printf("%-6s %-58s %8.3f <= %-6g (%s)\n", missed ? "MISSED" : "ok",
+                what_.c_str(), worst_, most_, where_.c_str());
+    return missed ? 1 : 0;
+  }
+
+ private:
+  std::string what_;
+  double most_;
+  bool offered_ = false;
+  double worst_ = 0;
+  std::string where_ = {};
+};
+
+std::string Where(const nlohmann::json& row) {
+  std::string where;
+  for (const char* key : {"scene", "hits", "covered", "cell_m"}) {
+    if (!row.contains(key)) continue;
+    if (!where.empty()) where += ' ';
+    where += row[key].is_string() ? row[key].get<std::string>()
+                                  : key + ("=" + row[key].dump());
+  }
+  return where;
+}
+
+constexpr double kNormalPercent[3] = {68.27, 95.45, 99.73};
+constexpr double kPoints[3] = {5, 3, 1};
+
+}  // namespace
+
+int CheckLimits(const nlohmann::json& report) {
+  int missed = 0;
+  const auto rows = [&report](const char* figure) {
+    return report.value(figure, nlohmann::json::array());
+  };
+  std::printf("\nlimits\n");
+
+  Limit optimal("rmse / (sigma / sqrt n), consistent pings, adaptive", 1.10);
+  for (const auto& row : rows("optimal")) {
+    optimal.Offer(row["adaptive"], Where(row));
+  }
+  missed += optimal.Report();
+
+  for (int k = 0; k < 3; ++k) {
+    const std::string key = "within_" + std::to_string(k + 1) + "std_percent";
+    Limit measured("measured cells: points off the normal share, " +
+                       std::to_string(k + 1) + " std",
+                   kPoints[k]);
+    for (const auto& row : rows("coverage")) {
+      if (row["estimator"] != "adaptive") continue;
+      measured.Offer(std::abs(row[key].get<double>() - kNormalPercent[k]),
+                     Where(row));
+    }
+    missed += measured.Report();
+    Limit bold("smoothed cells: points below the normal share, " +
+                   std::to_string(k + 1) + " std",
+               kPoints[k]);
+    Limit timid(
+        "smoothed cells: points above it, " + std::to_string(k + 1) + " std",
+        15);
+    for (const auto& row : rows("smoothed")) {
+      const double off = row[key].get<double>() - kNormalPercent[k];
+      bold.Offer(-off, Where(row));
+      timid.Offer(off, Where(row));
+    }
+    missed += bold.Report() + timid.Report();
+  }
+
+  Limit bins("stated against observed probability, all scenes", 0.03);
+  Limit free("answers FREE at 0.95 that are wrong, percent", 5);
+  Limit brier("Brier score over the better of nervegna and kalman", 1);
+  double ours = 0;
+  double others = 1;
+  for (const auto& row : rows("reliability")) {
+    if (row["scene"] != "all") {
+      if (row["estimator"] == "adaptive") {
+        free.Offer(row["free_wrong_percent"], Where(row));
+      }
+    } else if (row["estimator"] == "adaptive") {
+      bins.Offer(row["worst_bin"], Where(row));
+      ours = row["brier"];
+    } else {
+      others = std::min(others, row["brier"].get<double>());
+    }
+  }
+  if (ours > 0) brier.Offer(ours / others, "all");
+  missed += bins.Report() + free.Report() + brier.Report();
+
+  Limit prior("rmse with a prior 15 m off / without, two hits", 1.10);
+  for (const auto& row : rows("bad_prior")) {
+    if (row["hits"] == 2) prior.Offer(row["rmse_ratio"], Where(row));
+  }
+  missed += prior.Report();
+
+  Limit rocks("charted hazards answered FREE, per mille", 0.5);
+  for (const auto& row : rows("hazards")) {
+    rocks.Offer(1000 * row["free"].get<double>() / row["rocks"].get<double>(),
+                Where(row));
+  }
+  missed += rocks.Report();
+  return missed;
+}
+
+}  // namespace fathom::accuracy
