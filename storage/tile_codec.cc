@@ -14,8 +14,15 @@
 namespace fathom::storage {
 namespace {
 
-constexpr std::uint8_t kTileVersion = 1;
+constexpr std::uint8_t kTileVersion = 2;
 constexpr std::uint8_t kBlockVersion = 2;
+
+enum TileFlag : std::uint8_t {
+  kHasResiduals = 1,
+  kHasSpreads = 2,
+  kHasHazards = 4,
+  kAllTileFlags = 7,
+};
 
 enum BlockFlag : std::uint8_t {
   kHasTransferred = 1,
@@ -74,12 +81,22 @@ Bytes EncodeTile(const map::TileKey& key, const map::TileContent& content) {
   ByteWriter writer = StartBlob();
   writer.PutU64(key.Packed());
   writer.PutVarint(content.levels.size());
-  writer.PutBool(!content.residual_codes.empty());
+  std::uint8_t flags = 0;
+  if (!content.residual_codes.empty()) flags |= kHasResiduals;
+  if (!content.spread_codes.empty()) flags |= kHasSpreads;
+  if (!content.hazard_slots.empty()) flags |= kHasHazards;
+  writer.PutU8(flags);
   PutColumn(content.levels, writer);
   PutColumn(content.depths_m, writer);
   PutColumn(content.std_codes, writer);
   PutColumn(content.times_s, writer);
   PutColumn(content.residual_codes, writer);
+  PutColumn(content.spread_codes, writer);
+  if (!content.hazard_slots.empty()) {
+    writer.PutVarint(content.hazard_slots.size());
+    PutColumn(content.hazard_slots, writer);
+    PutColumn(content.hazards_m, writer);
+  }
   return SealBlob(BlobKind::kTile, kTileVersion, std::move(writer));
 }
 
@@ -94,14 +111,23 @@ absl::StatusOr<map::TileContent> DecodeTile(const map::TileKey& key,
     return absl::DataLossError(what + ": holds the bytes of another tile");
   }
   const std::size_t count = reader.GetCount(map::kTileCells);
-  const bool has_residuals = reader.GetBool();
+  const std::uint8_t flags = reader.GetU8();
+  if (flags > kAllTileFlags) reader.Fail();
   map::TileContent content;
   content.levels = GetColumn<std::uint8_t>(reader, count);
   content.depths_m = GetColumn<float>(reader, count);
   content.std_codes = GetColumn<std::uint16_t>(reader, count);
   content.times_s = GetColumn<std::uint32_t>(reader, count);
-  if (has_residuals) {
+  if ((flags & kHasResiduals) != 0) {
     content.residual_codes = GetColumn<std::uint8_t>(reader, count);
+  }
+  if ((flags & kHasSpreads) != 0) {
+    content.spread_codes = GetColumn<std::uint8_t>(reader, count);
+  }
+  if ((flags & kHasHazards) != 0) {
+    const std::size_t hazards = reader.GetCount(count);
+    content.hazard_slots = GetColumn<std::uint16_t>(reader, hazards);
+    content.hazards_m = GetColumn<float>(reader, hazards);
   }
   FATHOM_RETURN_IF_ERROR(reader.Finish(what));
   return content;

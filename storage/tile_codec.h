@@ -35,8 +35,8 @@ struct BlockKey {
   }
 };
 
-// REQUIRES: the arrays of `content` are equally long (residual_codes may be
-// empty).
+// REQUIRES: the arrays of `content` are equally long (residual_codes and
+// spread_codes may be empty; the two of hazards are as long as each other).
 Bytes EncodeTile(const map::TileKey& key, const map::TileContent& content);
 // Whether the content makes a sound tile is map::ValidateContent's question.
 // Errors: DATA_LOSS naming the tile; UNIMPLEMENTED for a newer version.

@@ -27,6 +27,8 @@ struct DepthEstimate {
   // the depth inside the cell together (Nervegna 2002, section 4.3).
   float std_m = 0.0f;
   EvidenceKind kind = EvidenceKind::kNone;
+  // How many soundings made it; 0: not told (charts, merged evidence).
+  std::uint16_t soundings = 0;
   // Unix time in seconds of the newest evidence; 0 means unknown.
   std::uint32_t time_s = 0;
   // The least depth that was credibly sounded in the cell; NaN: not kept.

@@ -107,9 +107,11 @@ void AreaWriter::WriteDeeper(WorkTile& tile, std::uint32_t begin,
       child.settled = false;
       WriteDeeper(child, 0, kTileCells);
       if (was_frozen) tree_.FreezeNode(node);
-    } else if (const auto evidence =
-                   SampleCell(CellInTile(tile.key, start, level))) {
-      Update(tile, start, *evidence);
+    } else {
+      const CellKey cell = CellInTile(tile.key, start, level);
+      if (const auto evidence = SampleCell(cell)) {
+        Update(tile, start, DividedEvidence(*evidence, cell.level - level_));
+      }
     }
     start += SpanOf(level);
   }

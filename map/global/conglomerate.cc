@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "map/global/fuse.h"
+
 namespace fathom::map {
 namespace {
 
@@ -38,14 +40,19 @@ std::optional<Leaf> JoinByRange(const std::array<Leaf, 4>& four,
       std::max(high - joined.depth_m, joined.depth_m - low), tolerance_m);
   if (code > 255) return std::nullopt;
   joined.residual_code = static_cast<std::uint8_t>(code);
-  double moment_m2 = 0;
+  CellEvidence moments;
   for (const Leaf& leaf : four) {
-    const double std_m = leaf.std_m();
+    const CellEvidence part = EvidenceOf(leaf);
     const double offset_m = leaf.depth_m - joined.depth_m;
-    moment_m2 += std_m * std_m + offset_m * offset_m;
+    // Where a part's mean lies is not known any more: that is no variability
+    // inside it.
+    moments.variance_m2 += 0.25 * (part.variance_m2 + offset_m * offset_m);
+    moments.variability_m2 += 0.25 * part.variability_m2;
+    joined.hazard_m = std::min(joined.hazard_m, leaf.hazard_m);
   }
-  joined.std_code =
-      MakeStdCode(four[0].kind(), static_cast<float>(std::sqrt(moment_m2 / 4)));
+  const Leaf coded = MakeLeaf(four[0].kind(), moments);
+  joined.std_code = coded.std_code;
+  joined.spread_code = coded.spread_code;
   return joined;
 }
 
@@ -54,6 +61,7 @@ std::optional<Leaf> JoinPairwise(const std::array<Leaf, 4>& four,
   double mean_m = 0;
   double std_m = 0;
   int residual = 0;
+  float hazard_m = kNoHazard;
   for (const Leaf& leaf : four) {
     for (const Leaf& other : four) {
       if (std::abs(leaf.depth_m - other.depth_m) > tolerance_m) {
@@ -65,6 +73,7 @@ std::optional<Leaf> JoinPairwise(const std::array<Leaf, 4>& four,
   }
   // Kept as far as the code reaches: this rule promises no bound.
   for (const Leaf& leaf : four) {
+    hazard_m = std::min(hazard_m, leaf.hazard_m);
     residual = std::max(
         residual,
         leaf.residual_code +
@@ -73,20 +82,29 @@ std::optional<Leaf> JoinPairwise(const std::array<Leaf, 4>& four,
   return Leaf{
       .depth_m = static_cast<float>(mean_m),
       .std_code = MakeStdCode(four[0].kind(), static_cast<float>(std_m)),
-      .residual_code = static_cast<std::uint8_t>(std::min(residual, 255))};
+      .residual_code = static_cast<std::uint8_t>(std::min(residual, 255)),
+      .hazard_m = hazard_m};
 }
 
 class Conglomerator {
  public:
-  Conglomerator(WorkTree& tree, MergeRule rule) : tree_(tree), rule_(rule) {}
+  Conglomerator(WorkTree& tree, MergeRule rule,
+                std::span<const LatticeBox> kept)
+      : tree_(tree), rule_(rule), kept_(kept) {}
 
   // True if the tile has become a single leaf, which then is open.
   bool Visit(WorkNode& node) {
-    const bool settles = rule_ == MergeRule::kRange;
-    if (node.work == nullptr && settles && node.frozen->settled()) return false;
+    const TileKey key =
+        node.work != nullptr ? node.work->key : node.frozen->key();
+    const bool free = !IsKept(key.Root());
+    // A tile that touches a kept area may have more to join when that is free.
+    const bool settles = rule_ == MergeRule::kRange && free;
+    if (rule_ == MergeRule::kRange &&
+        (node.work != nullptr ? node.work->settled : node.frozen->settled())) {
+      return false;
+    }
     const bool was_frozen = node.work == nullptr;
     WorkTile& tile = tree_.Open(node);
-    if (settles && tile.settled) return false;
     for (std::uint32_t start = 0; start < kTileCells;) {
       const std::uint32_t span = SpanOf(tile.levels[start]);
       if (tile.leaves[start].std_code == kChildCode) {
@@ -100,7 +118,7 @@ class Conglomerator {
       start += span;
     }
     for (int level = kTileLevels - 1; level >= 0; --level) {
-      JoinLevel(tile, level);
+      JoinLevel(tile, level, free);
     }
     tile.settled = settles;
     const bool single = tile.levels[0] == 0 && tile.key.level > 0;
@@ -112,7 +130,7 @@ class Conglomerator {
 
  private:
   // Joins, in one tile, the leaves of `level` + 1 that can be joined.
-  void JoinLevel(WorkTile& tile, int level) {
+  void JoinLevel(WorkTile& tile, int level, bool free) {
     const std::uint32_t span = SpanOf(level);
     const std::uint32_t part = span / 4;
     for (std::uint32_t start = 0; start < kTileCells; start += span) {
@@ -124,6 +142,7 @@ class Conglomerator {
                      four[i].std_code != kChildCode;
       }
       if (!all_leaves) continue;
+      if (!free && IsKept(CellInTile(tile.key, start, level))) continue;
       if (const auto joined = JoinFour(four, rule_, tree_.tolerance_m())) {
         tile.Merge(start, level, *joined);
         ++merges_;
@@ -131,8 +150,20 @@ class Conglomerator {
     }
   }
 
+  bool IsKept(const CellKey& cell) const {
+    const int up = kMaxLevel - cell.level;
+    const std::uint32_t last = (std::uint32_t{1} << up) - 1;
+    const std::uint32_t row = cell.row << up;
+    const std::uint32_t col = cell.col << up;
+    return std::any_of(kept_.begin(), kept_.end(), [&](const LatticeBox& box) {
+      return row <= box.row_last && row + last >= box.row_first &&
+             col <= box.col_last && col + last >= box.col_first;
+    });
+  }
+
   WorkTree& tree_;
   const MergeRule rule_;
+  const std::span<const LatticeBox> kept_;
   std::uint64_t merges_ = 0;
 };
 
@@ -143,6 +174,8 @@ std::optional<Leaf> JoinFour(const std::array<Leaf, 4>& four, MergeRule rule,
   std::uint32_t oldest_s = four[0].time_s;
   for (const Leaf& leaf : four) {
     if (leaf.kind() != four[0].kind()) return std::nullopt;
+    // A hazard does not spread over a place where it is not.
+    if (leaf.has_hazard() != four[0].has_hazard()) return std::nullopt;
     oldest_s = std::min(oldest_s, leaf.time_s);
   }
   if (!four[0].known()) return Leaf{};
@@ -154,8 +187,9 @@ std::optional<Leaf> JoinFour(const std::array<Leaf, 4>& four, MergeRule rule,
   return joined;
 }
 
-std::uint64_t ConglomerateTree(WorkTree& tree, MergeRule rule) {
-  Conglomerator conglomerator(tree, rule);
+std::uint64_t ConglomerateTree(WorkTree& tree, MergeRule rule,
+                               std::span<const LatticeBox> kept) {
+  Conglomerator conglomerator(tree, rule, kept);
   conglomerator.Visit(tree.root());
   tree.CountMerges(conglomerator.merges());
   return conglomerator.merges();

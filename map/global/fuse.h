@@ -10,18 +10,23 @@
 
 namespace fathom::map {
 
-// Independent knowledge about the depth of one cell, as N(mean, variance).
-// Land says nothing else.
+// Independent knowledge about the depth of one cell. Land says nothing else.
 struct CellEvidence {
   double mean_m = 0;
-  double variance_m2 = 0;
+  double variance_m2 = 0;     // Of the mean.
+  double variability_m2 = 0;  // Inside the cell, tau^2.
+  // How many soundings made it; 0: not known (taken as several).
+  std::uint32_t soundings = 0;
+  float hazard_m = kNoHazard;
   std::uint32_t time_s = 0;
   bool land = false;
 };
 
 // Joins what was found at several points of one cell: the mean of the means;
-// the mean of the variances plus the variance of the means (the points are
-// parts of the cell, not repeated looks at it); the newest time.
+// the mean of the variances (errors of neighbours are seldom independent);
+// variability is the mean of the parts' own and the variance of their means
+// (they are parts of the cell, not repeated looks at it); all their soundings,
+// the shoalest hazard, the newest time.
 class EvidenceSum {
  public:
   void Add(const CellEvidence& evidence);
@@ -37,18 +42,63 @@ class EvidenceSum {
   double sum_ = 0;
   double sum_squares_ = 0;
   double sum_variances_ = 0;
+  double sum_variabilities_ = 0;
+  std::uint64_t soundings_ = 0;
+  float hazard_m_ = kNoHazard;
   std::uint32_t time_s_ = 0;
 };
+
+// What two bodies of evidence say together, before it is put into codes: mean
+// by eq. 4.18 and variance of the mean by eq. 4.20 with the gain k of eq. 4.17,
+// taking both as independent (Nervegna 2002, sections 4.3.3 and 4.4.4.3; the
+// thesis chose 4.21, whose variance stops falling). Only the variance of the
+// mean shrinks. Variability is averaged by weight, (1 - k) tau1^2 + k tau2^2,
+// and takes up what the means' variances do not explain of their distance d:
+//
+//   k (1 - k) max(0, d^2 - 4 (v1 + v2))
+//
+// k (1 - k) d^2 is the variance between the two about the fused mean (the
+// moment estimate of random effects: DerSimonian and Laird 1986,
+// doi:10.1016/0197-2456(86)90046-2); up to two sigma it is taken for chance,
+// which adds 4 % to the variance where they do agree. Surveys that disagree so
+// leave a std that covers both, and later ones that agree outweigh it again.
+// The shoalest hazard stays, the newest time. Symmetric to the last bit.
+CellEvidence FuseEvidence(const CellEvidence& a, const CellEvidence& b);
+
+// A prior and evidence: as the local map reads them (FusePrior in
+// map/geodesy/depth_fusion.h), a prior that the evidence contradicts is widened
+// to the contradiction. The prior counts with all its std, the variability is
+// the evidence's.
+CellEvidence FuseWithPrior(const CellEvidence& prior,
+                           const CellEvidence& evidence);
 
 // A leaf of its own.
 Leaf MakeLeaf(LeafKind kind, const CellEvidence& evidence);
 
-// Mean by eq. 4.18 and variance by eq. 4.20 with the gain of eq. 4.17, taking
-// leaf and evidence as independent (Nervegna 2002, sections 4.3.3 and 4.4.4.3;
-// the thesis chose 4.21, whose variance stops falling). The kind becomes
-// `kind`, the time the newer one; the residual shrinks with the weight that the
-// old mean keeps. REQUIRES: the leaf is prior or measured; evidence is no land.
+// What a leaf knows, as evidence. REQUIRES: it is prior or measured.
+CellEvidence EvidenceOf(const Leaf& leaf);
+
+// FuseWithPrior where a prior leaf is measured (`kind` is kMeasured), else
+// FuseEvidence, in the leaf. The kind becomes `kind`; the residual shrinks with
+// the weight that the old mean keeps. REQUIRES: the leaf is prior or measured;
+// evidence is no land.
+//
+// Evidence is rounded to a leaf's codes before it is fused with measured
+// evidence, as that was when it came: so two surveys of unknown ground give the
+// same leaf in either order, bit for bit. A prior beneath, or a third survey,
+// leaves a code step (tests/map/global/fuse_test.cc measures it and says why
+// 12 bytes cannot do better).
 void FuseLeaf(const CellEvidence& evidence, LeafKind kind, Leaf& leaf);
+
+// What a quarter of the leaf's cell inherits: its mean lies off the leaf's by
+// the variability of the leaf, of which a plane keeps a quarter in each part
+// (variability goes with the square of the side), so three quarters of tau^2
+// move to the variance of the mean. The predictive std, the hazard and the rest
+// stay: nobody knows in which part the hazard is.
+Leaf DividedLeaf(const Leaf& leaf);
+// The same for evidence of a cell that is to be used `levels` deeper: what a
+// leaf made of it would have handed down.
+CellEvidence DividedEvidence(const CellEvidence& evidence, int levels);
 
 }  // namespace fathom::map
 

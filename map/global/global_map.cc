@@ -35,10 +35,11 @@ GlobalMap::GlobalMap(GlobalMap&&) noexcept = default;
 GlobalMap& GlobalMap::operator=(GlobalMap&&) noexcept = default;
 GlobalMap::~GlobalMap() = default;
 
-GlobalMap::ConglomerateSummary GlobalMap::Conglomerate(MergeRule rule) {
+GlobalMap::ConglomerateSummary GlobalMap::Conglomerate(
+    MergeRule rule, std::span<const LatticeBox> kept) {
   ConglomerateSummary summary;
   summary.leaves_before = tree_->leaf_count();
-  summary.merges = ConglomerateTree(*tree_, rule);
+  summary.merges = ConglomerateTree(*tree_, rule, kept);
   summary.leaves_after = tree_->leaf_count();
   return summary;
 }
@@ -81,7 +82,10 @@ absl::Status GlobalMap::FinishRestore() {
                    .std_code = content.std_codes[i],
                    .residual_code = content.residual_codes.empty()
                                         ? std::uint8_t{0}
-                                        : content.residual_codes[i]};
+                                        : content.residual_codes[i],
+                   .spread_code = content.spread_codes.empty()
+                                      ? std::uint8_t{0}
+                                      : content.spread_codes[i]};
       if (leaves[i].std_code == kChildCode) {
         const CellKey cell = CellInTile(key, position, content.levels[i]);
         const auto child = built.find(
@@ -95,6 +99,9 @@ absl::Status GlobalMap::FinishRestore() {
         built.erase(child);
       }
       position += SpanOf(content.levels[i]);
+    }
+    for (std::size_t i = 0; i < content.hazard_slots.size(); ++i) {
+      leaves[content.hazard_slots[i]].hazard_m = content.hazards_m[i];
     }
     built.emplace(key, Tile::Build(key, content.levels, leaves,
                                    std::move(children), tree_->tolerance_m()));

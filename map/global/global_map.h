@@ -10,7 +10,11 @@
 //      11-13) and the summary counts it.
 //   4. Every mean that Conglomerate() replaced lies within tolerance_m of the
 //      mean that replaced it, however often merging ran (rule kRange).
-//   5. The same calls in the same order give bit-identical leaves, whether or
+//   5. Two surveys (MergeArea) of unknown ground with cells of one size give the
+//      same leaves in either order, bit for bit, as long as Conglomerate() has
+//      not joined one of them in between; over a chart they differ by code
+//      steps (map/global/fuse.h).
+//   6. The same calls in the same order give bit-identical leaves, whether or
 //      not views were taken, or the map was stored and restored, in between.
 //
 // Working form: immutable tiles are expanded into dense ones of 64 x 64
@@ -34,6 +38,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -125,7 +130,11 @@ class GlobalMap {
   // whose middle lies in the area is offered to `source`; where it answers,
   // the leaf is divided down to the cell, its value inherited, and fused
   //   with an unknown or land leaf: takes the evidence;
-  //   with a prior or measured one: eq. 4.17, 4.18, 4.20, as independent.
+  //   with a prior one: 4.17, 4.18, 4.20, the prior widened where it is
+  //     contradicted (FusePrior);
+  //   with a measured one: the same as independent; only std^2 - variability^2
+  //     shrinks, disagreement widens (map/global/fuse.h states the rule).
+  // A hazard stays: of two the shoalest.
   // Areas that share a side with bit-identical corners share no cell and leave
   // none out, so an area may be cut into blocks in any way.
   //
@@ -153,9 +162,16 @@ class GlobalMap {
 
   // Merges siblings that agree, from the leaves up, over the whole map (fig.
   // 4-18); tiles that did not change since the last time are not opened.
-  // Kinds never mix: unknown merges with unknown, land with land. A merged
+  // Kinds never mix: unknown merges with unknown, land with land; nor do leaves
+  // with a point hazard and such without (the shoalest hazard stays). A merged
   // leaf's time is the oldest of the four (0 if any is 0).
-  ConglomerateSummary Conglomerate(MergeRule rule = MergeRule::kRange);
+  //
+  // Nothing is joined that touches one of `kept`: where evidence is still to
+  // come, so that it meets the leaves as they were measured and the order in
+  // which surveys arrive does not matter (a joined mean is up to tolerance_m
+  // off the means that it replaced).
+  ConglomerateSummary Conglomerate(MergeRule rule = MergeRule::kRange,
+                                   std::span<const LatticeBox> kept = {});
 
   // Freezes what was written and returns the map as it is now. O(what was
   // written since the last call).

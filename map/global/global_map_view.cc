@@ -72,6 +72,12 @@ std::optional<DepthEstimate> GlobalMapView::At(
   estimate.std_m = found.leaf.std_m();
   estimate.kind = ToEvidenceKind(found.leaf.kind());
   estimate.time_s = found.leaf.time_s;
+  if (found.leaf.spread_code != 0) {
+    estimate.variability_m = found.leaf.variability_m();
+  }
+  if (found.leaf.hazard_m < found.leaf.depth_m) {
+    estimate.hazard_m = found.leaf.hazard_m;
+  }
   estimate.cell_size_m = static_cast<float>(root_.cell_size_m(found.level));
   return answer;
 }
@@ -95,7 +101,8 @@ std::optional<DepthBounds> GlobalMapView::Bounds(const CellKey& cell) const {
   const auto add_leaf = [&](const Leaf& leaf) {
     if (!leaf.known()) return;
     const float residual_m = DecodeResidualM(leaf.residual_code, tolerance_m_);
-    bounds.shoalest_m = std::min(bounds.shoalest_m, leaf.depth_m - residual_m);
+    bounds.shoalest_m =
+        std::min({bounds.shoalest_m, leaf.depth_m - residual_m, leaf.hazard_m});
     bounds.deepest_m = std::max(bounds.deepest_m, leaf.depth_m + residual_m);
   };
   const auto add_tile = [&](const Tile& tile) {

@@ -25,7 +25,8 @@
 namespace fathom::map {
 
 // The least and the greatest depth in a part of the map (of means, without
-// their uncertainty; of every fine mean that a merged leaf replaced).
+// their uncertainty; of every fine mean that a merged leaf replaced; the least
+// of point hazards too).
 struct DepthBounds {
   float shoalest_m = 0;
   float deepest_m = 0;
@@ -43,7 +44,8 @@ class GlobalMapView {
 
   // The leaf at a point: prior, measured or land, never smoothed. nullopt
   // where nothing is known, outside the square and for coordinates that are
-  // not finite. shoalest_m is not kept (NaN). At most four tiles deep;
+  // not finite. variability_m and hazard_m as they are known; shoalest_m and
+  // soundings are not kept (NaN, 0). At most four tiles deep;
   // <= 80 ns on a warm map.
   std::optional<DepthEstimate> At(const GeodeticPoint& point) const;
 

@@ -1,17 +1,22 @@
 // Leaf: what one cell of the global map holds, and the codes it is kept in.
 //
-// The thesis's cell takes 128 bytes (section 6.1.2); a leaf here takes 10, or
-// 11 in a tile that holds merged leaves. What is kept is exactly what is
-// stored: codes go to disk as they are, so a map read back is bit-identical.
+// The thesis's cell takes 128 bytes (section 6.1.2); a leaf here takes 6 to 11
+// (see tile.h). What is kept is exactly what is stored: codes go to disk as
+// they are, so a map read back is bit-identical.
 //
 // std_code, 16 bits:
 //   bits 15-14  kind: 0 no value, 1 prior, 2 measured, 3 land
-//   bits 13-0   standard deviation as a float without sign, 5 bits of exponent
-//               (least 2^-10) and 9 of mantissa: 2^-10 m (about 1 mm) to 1024 m
-//               in steps of 0.1-0.2 %, decoded with one shift. Zero if no
-//               value.
+//   bits 13-0   standard deviation of the mean as a float without sign, 5 bits
+//               of exponent (least 2^-10) and 9 of mantissa: 2^-10 m (about 1
+//               mm) to 1024 m in steps of 0.1-0.2 %, decoded with one shift.
+//               Zero if no value.
+// spread_code, 8 bits: the predictive std (mean and variability inside the cell
+//   together) over that of the mean, in steps of 2^(1/40) = 1.75 %, to nearest;
+//   0: 1, no variability is known. So a fusion weighs with a precise weight,
+//   and the answer's std is right to 0.9 %.
 // residual_code, 8 bits: how far, at most, any fine mean that this leaf
 //   replaced lies from depth_m, in 1/255 of the map's tolerance, rounded up.
+// hazard_m, a float as it came (DepthEstimate::hazard_m); +infinity: none.
 //
 // Pure functions and plain values; thread-safe.
 
@@ -19,8 +24,11 @@
 #define FATHOM_MAP_GLOBAL_LEAF_H_
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "map/geodesy/depth_estimate.h"
 
@@ -70,17 +78,55 @@ constexpr std::uint16_t MakeStdCode(LeafKind kind, float std_m) {
                                           EncodeStd(std_m));
 }
 
-// A leaf by value. One that is unknown has all fields zero.
+// Ratios that spread codes stand for: 2^(code / 40), up to 83. Made by
+// multiplication so that every machine has the same bits.
+constexpr std::array<float, 256> MakeSpreadRatios() {
+  std::array<float, 256> ratios{};
+  double ratio = 1.0;
+  for (float& entry : ratios) {
+    entry = static_cast<float>(ratio);
+    ratio *= 1.0174796921026863;  // 2^(1/40).
+  }
+  return ratios;
+}
+inline constexpr std::array<float, 256> kSpreadRatios = MakeSpreadRatios();
+
+// The nearest code (in the logarithm), clamped. REQUIRES: ratio is not NaN.
+constexpr std::uint8_t EncodeSpread(double ratio) {
+  // Half a step down: then the first not below is the nearest.
+  const double least = ratio / 1.0087019;
+  const auto* const found =
+      std::lower_bound(kSpreadRatios.begin(), kSpreadRatios.end() - 1, least);
+  return static_cast<std::uint8_t>(found - kSpreadRatios.begin());
+}
+
+// Leaf::hazard_m where no hazard is known.
+inline constexpr float kNoHazard = std::numeric_limits<float>::infinity();
+
+// A leaf by value. One that is unknown has all fields as here.
 struct Leaf {
   float depth_m = 0;
   std::uint32_t time_s = 0;  // Unix seconds of the evidence; 0: unknown.
   std::uint16_t std_code = 0;
   std::uint8_t residual_code = 0;
+  std::uint8_t spread_code = 0;
+  float hazard_m = kNoHazard;
 
   LeafKind kind() const { return static_cast<LeafKind>(std_code >> 14); }
   bool known() const { return kind() != LeafKind::kUnknown; }
-  // REQUIRES: known().
-  float std_m() const { return DecodeStd(std_code); }
+  // The following REQUIRE known().
+  // Of the mean alone.
+  float mean_std_m() const { return DecodeStd(std_code); }
+  // Predictive: mean and variability (DepthEstimate::std_m).
+  float std_m() const {
+    return DecodeStd(std_code) * kSpreadRatios[spread_code];
+  }
+  // Variability inside the cell, tau.
+  float variability_m() const {
+    const float ratio = kSpreadRatios[spread_code];
+    return DecodeStd(std_code) * std::sqrt(ratio * ratio - 1.0f);
+  }
+  bool has_hazard() const { return hazard_m != kNoHazard; }
 
   friend bool operator==(const Leaf&, const Leaf&) = default;
 };

@@ -100,10 +100,25 @@ class TransferRule final : public CellRule {
       ++ignored_;
       return std::nullopt;
     }
-    return CellEvidence{
+    const double std_m = answer->std_m;
+    // Written so that NaN is none.
+    const double variability_m =
+        answer->variability_m > 0
+            ? std::min(double{answer->variability_m}, std_m)
+            : 0.0;
+    CellEvidence evidence{
         .mean_m = answer->depth_m,
-        .variance_m2 = static_cast<double>(answer->std_m) * answer->std_m,
+        .variance_m2 = std::max(std_m * std_m - variability_m * variability_m,
+                                double{kMinLeafStdM} * kMinLeafStdM),
+        .variability_m2 = variability_m * variability_m,
+        .soundings = answer->soundings,
         .time_s = answer->time_s};
+    // NaN fails too; a hazard below the seabed is none.
+    if (answer->hazard_m >= kMinChartDepthM &&
+        answer->hazard_m < answer->depth_m) {
+      evidence.hazard_m = answer->hazard_m;
+    }
+    return evidence;
   }
 
   const Quadrilateral& area_;

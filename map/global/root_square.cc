@@ -137,6 +137,28 @@ int RootSquare::LevelFor(double cell_size_m) const {
   return level;
 }
 
+std::optional<LatticeBox> RootSquare::BoxAround(
+    const std::array<GeodeticPoint, 4>& corners) const {
+  constexpr double kCells = 1 << kMaxLevel;
+  SquarePoint low{.u = 1, .v = 1};
+  SquarePoint high{.u = 0, .v = 0};
+  for (const GeodeticPoint& corner : corners) {
+    const std::optional<SquarePoint> place = Project(corner);
+    if (!place) return std::nullopt;
+    low = {.u = std::min(low.u, place->u), .v = std::min(low.v, place->v)};
+    high = {.u = std::max(high.u, place->u), .v = std::max(high.v, place->v)};
+  }
+  if (high.u < 0 || high.v < 0 || low.u >= 1 || low.v >= 1) return std::nullopt;
+  const auto index = [](double fraction) {
+    return static_cast<std::uint32_t>(
+        std::clamp(std::floor(fraction * kCells), 0.0, kCells - 1));
+  };
+  return LatticeBox{.row_first = index(low.u),
+                    .row_last = index(high.u),
+                    .col_first = index(low.v),
+                    .col_last = index(high.v)};
+}
+
 GeodeticPoint RootSquare::Unproject(const SquarePoint& point) const {
   return ToGeodetic(Meet(RowPlane(point.u), ColPlane(point.v)));
 }

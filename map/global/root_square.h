@@ -49,6 +49,14 @@ struct LatticePoint {
   std::uint32_t col = 0;
 };
 
+// A rectangle of lattice cells; ends are included.
+struct LatticeBox {
+  std::uint32_t row_first = 0;
+  std::uint32_t row_last = 0;
+  std::uint32_t col_first = 0;
+  std::uint32_t col_last = 0;
+};
+
 class RootSquare {
  public:
   // The longest side, as an angle at the Earth's centre. At 90 degrees the
@@ -125,6 +133,13 @@ class RootSquare {
   // The lattice cell that holds the point; nullopt if it is outside. The
   // square's sides count as inside (1e-12 of a side).
   std::optional<LatticePoint> LocateLattice(const GeodeticPoint& point) const;
+
+  // The least box about the quadrilateral with these corners (its sides, as
+  // great circles, are sides of it within their length squared / 8 Earth radii:
+  // 5 cm at 1.6 km), clipped to the square; nullopt if it lies outside or a
+  // corner does not project.
+  std::optional<LatticeBox> BoxAround(
+      const std::array<GeodeticPoint, 4>& corners) const;
 
   // The cell of `level` that holds the point; nullopt if it is outside.
   // REQUIRES: 0 <= level <= kMaxLevel.

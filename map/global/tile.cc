@@ -23,6 +23,9 @@ constexpr int kBlockLevel = 3;
 constexpr unsigned kQuarterShift = 16;
 constexpr unsigned kRankShift = 20;
 
+// The bits of a time of three bytes.
+constexpr std::uint32_t kShortTimeMask = 0xffffff;
+
 // What an allocator adds to a block of memory, near enough.
 constexpr std::size_t kAllocationBytes = 16;
 constexpr std::size_t kControlBytes = 24;
@@ -111,9 +114,20 @@ std::shared_ptr<const Tile> Tile::Build(
   blocks[block_count] = inner_leaves << kRankShift;
 
   const std::size_t slots = levels.size();
-  const bool residuals =
-      std::any_of(leaves.begin(), leaves.end(),
-                  [](const Leaf& leaf) { return leaf.residual_code != 0; });
+  bool residuals = false;
+  bool spreads = false;
+  std::size_t hazards = 0;
+  std::uint32_t earliest_s = 0;
+  std::uint32_t latest_s = 0;
+  for (const Leaf& leaf : leaves) {
+    if (!leaf.known()) continue;
+    residuals = residuals || leaf.residual_code != 0;
+    spreads = spreads || leaf.spread_code != 0;
+    hazards += leaf.has_hazard() ? 1 : 0;
+    if (leaf.time_s == 0) continue;
+    if (earliest_s == 0 || leaf.time_s < earliest_s) earliest_s = leaf.time_s;
+    latest_s = std::max(latest_s, leaf.time_s);
+  }
   // Charts and quick surveys: one time for all.
   const auto first_known =
       std::find_if(leaves.begin(), leaves.end(),
@@ -125,17 +139,23 @@ std::shared_ptr<const Tile> Tile::Build(
       std::all_of(leaves.begin(), leaves.end(), [time_s](const Leaf& leaf) {
         return !leaf.known() || leaf.time_s == time_s;
       });
-  const std::size_t record_bytes = one_time ? kTimelessBytes : kRecordBytes;
+  const bool short_time = !one_time && latest_s - earliest_s < kShortTimeMask;
+  const std::size_t record_bytes = one_time     ? kTimelessBytes
+                                   : short_time ? kShortTimeBytes
+                                                : kRecordBytes;
   const std::size_t bytes_behind =
       children.size() * sizeof(Child) + (block_count + 1) * kBlockBytes +
-      slots * (record_bytes + (residuals ? 1u : 0u));
+      slots * (record_bytes + (residuals ? 1u : 0u) + (spreads ? 1u : 0u)) +
+      hazards * kHazardBytes + 1;
   std::shared_ptr<Tile> tile(new (bytes_behind) Tile(key));
   tile->whole_ = whole;
   tile->divided_ = divided;
   tile->slot_count_ = static_cast<std::uint16_t>(slots);
   tile->record_bytes_ = static_cast<std::uint8_t>(record_bytes);
-  tile->time_s_ = one_time ? time_s : 0;
+  tile->time_s_ = one_time ? time_s : short_time ? earliest_s : 0;
   tile->has_residuals_ = residuals;
+  tile->has_spreads_ = spreads;
+  tile->hazard_count_ = static_cast<std::uint16_t>(hazards);
   tile->blocks_at_ = static_cast<std::uint32_t>(
       sizeof(Tile) + children.size() * sizeof(Child));
   tile->records_at_ = static_cast<std::uint32_t>(
@@ -156,15 +176,41 @@ std::shared_ptr<const Tile> Tile::Build(
     const bool is_child = leaf.std_code == kChildCode;
     StoreAs(to, is_child ? 0.0f : leaf.depth_m);
     StoreAs(to + 4, leaf.std_code);
-    if (!one_time) StoreAs(to + 6, is_child ? child++ : leaf.time_s);
+    if (!one_time) {
+      std::uint32_t field = leaf.time_s;
+      if (is_child) {
+        field = child++;
+      } else if (short_time && leaf.time_s != 0) {
+        field = leaf.time_s - earliest_s + 1;
+      }
+      // Little-endian: of three bytes the least significant.
+      std::memcpy(to + 6, &field, record_bytes - 6);
+    }
     to += record_bytes;
   }
+  // A child's leaf holds what the writer left there.
   if (residuals) {
     for (const Leaf& leaf : leaves) {
-      *to++ = std::byte{leaf.std_code == kChildCode ? std::uint8_t{0}
-                                                    : leaf.residual_code};
+      *to++ = std::byte{leaf.known() ? leaf.residual_code : std::uint8_t{0}};
     }
   }
+  if (spreads) {
+    for (const Leaf& leaf : leaves) {
+      *to++ = std::byte{leaf.known() ? leaf.spread_code : std::uint8_t{0}};
+    }
+  }
+  if (hazards > 0) {
+    std::byte* depth = to + hazards * sizeof(std::uint16_t);
+    for (std::size_t slot = 0; slot < slots; ++slot) {
+      if (!leaves[slot].known() || !leaves[slot].has_hazard()) continue;
+      StoreAs(to, static_cast<std::uint16_t>(slot));
+      StoreAs(depth, leaves[slot].hazard_m);
+      to += sizeof(std::uint16_t);
+      depth += sizeof(float);
+    }
+    to = depth;
+  }
+  *to = std::byte{0};
   tile->AddTotals(tolerance_m);
   return tile;
 }
@@ -186,6 +232,7 @@ void Tile::AddTotals(float tolerance_m) {
     const float residual_m = DecodeResidualM(leaf.residual_code, tolerance_m);
     totals.shoalest_m = std::min(totals.shoalest_m, leaf.depth_m - residual_m);
     totals.deepest_m = std::max(totals.deepest_m, leaf.depth_m + residual_m);
+    totals.shoalest_m = std::min(totals.shoalest_m, leaf.hazard_m);
   }
   for (const std::shared_ptr<const Tile>& child : this->children()) {
     const TileTotals& below = child->totals();
@@ -232,8 +279,46 @@ int Tile::LevelOf(std::uint32_t position) const {
 
 inline std::uint32_t Tile::TimeOf(const std::byte* record,
                                   std::uint16_t std_code) const {
+  if (record_bytes_ == kShortTimeBytes) {
+    const std::uint32_t field =
+        LoadAs<std::uint32_t>(record + 6) & kShortTimeMask;
+    return field == 0 ? 0 : time_s_ + field - 1;
+  }
   if (record_bytes_ == kRecordBytes) return LoadAs<std::uint32_t>(record + 6);
   return (std_code >> 14) == 0 ? 0 : time_s_;
+}
+
+inline std::uint32_t Tile::ChildIndex(const std::byte* record) const {
+  // Below 4096 whether it has three bytes or four.
+  return LoadAs<std::uint32_t>(record + 6) & kShortTimeMask;
+}
+
+inline void Tile::LoadRest(std::uint32_t slot, Leaf& leaf) const {
+  if (has_residuals_) {
+    leaf.residual_code = static_cast<std::uint8_t>(Residuals()[slot]);
+  }
+  if (has_spreads_) {
+    leaf.spread_code = static_cast<std::uint8_t>(Spreads()[slot]);
+  }
+  if (hazard_count_ == 0) [[likely]]
+    return;
+  const std::byte* const slots = HazardSlots();
+  std::uint32_t begin = 0;
+  std::uint32_t end = hazard_count_;
+  while (begin < end) {
+    const std::uint32_t middle = (begin + end) / 2;
+    const auto at =
+        LoadAs<std::uint16_t>(slots + middle * sizeof(std::uint16_t));
+    if (at == slot) {
+      leaf.hazard_m = LoadAs<float>(HazardDepths() + middle * sizeof(float));
+      return;
+    }
+    if (at < slot) {
+      begin = middle + 1;
+    } else {
+      end = middle;
+    }
+  }
 }
 
 Tile::Found Tile::Descend(const Tile& root, std::uint32_t row,
@@ -254,14 +339,11 @@ Tile::Found Tile::Descend(const Tile& root, std::uint32_t row,
       found.leaf.depth_m = LoadAs<float>(record);
       found.leaf.time_s = tile->TimeOf(record, std_code);
       found.leaf.std_code = std_code;
-      if (tile->has_residuals_) {
-        found.leaf.residual_code = static_cast<std::uint8_t>(
-            *(tile->Record(tile->slot_count_) + rank.slot));
-      }
+      tile->LoadRest(rank.slot, found.leaf);
       found.level = tile->key_.level + rank.Level();
       return found;
     }
-    tile = tile->Children()[LoadAs<std::uint32_t>(record + 6)].get();
+    tile = tile->Children()[tile->ChildIndex(record)].get();
   }
 }
 
@@ -279,12 +361,11 @@ Tile::Found Tile::Find(std::uint32_t position) const {
 Leaf Tile::LeafAt(std::uint32_t slot) const {
   const std::byte* const record = Record(slot);
   const auto std_code = LoadAs<std::uint16_t>(record + 4);
-  return {.depth_m = LoadAs<float>(record),
-          .time_s = std_code == kChildCode ? 0 : TimeOf(record, std_code),
-          .std_code = std_code,
-          .residual_code = has_residuals_ ? static_cast<std::uint8_t>(
-                                                *(Record(slot_count_) + slot))
-                                          : std::uint8_t{0}};
+  Leaf leaf{.depth_m = LoadAs<float>(record),
+            .time_s = std_code == kChildCode ? 0 : TimeOf(record, std_code),
+            .std_code = std_code};
+  LoadRest(slot, leaf);
+  return leaf;
 }
 
 bool Tile::IsChild(std::uint32_t slot) const {
@@ -292,7 +373,7 @@ bool Tile::IsChild(std::uint32_t slot) const {
 }
 
 const std::shared_ptr<const Tile>& Tile::ChildAt(std::uint32_t slot) const {
-  return Children()[LoadAs<std::uint32_t>(Record(slot) + 6)];
+  return Children()[ChildIndex(Record(slot))];
 }
 
 bool Tile::SameSlots(const Tile& other) const {
@@ -300,6 +381,8 @@ bool Tile::SameSlots(const Tile& other) const {
   return slot_count_ == other.slot_count_ &&
          child_count_ == other.child_count_ && whole_ == other.whole_ &&
          divided_ == other.divided_ && has_residuals_ == other.has_residuals_ &&
+         has_spreads_ == other.has_spreads_ &&
+         hazard_count_ == other.hazard_count_ &&
          record_bytes_ == other.record_bytes_ && time_s_ == other.time_s_ &&
          std::memcmp(Block(0), other.Block(0), ByteCount()) == 0;
 }
@@ -318,6 +401,11 @@ TileContent Tile::Content() const {
     content.times_s.push_back(leaf.time_s);
     if (has_residuals_) {
       content.residual_codes.push_back(leaf.residual_code);
+    }
+    if (has_spreads_) content.spread_codes.push_back(leaf.spread_code);
+    if (leaf.has_hazard()) {
+      content.hazard_slots.push_back(static_cast<std::uint16_t>(slot));
+      content.hazards_m.push_back(leaf.hazard_m);
     }
   });
   return content;
@@ -341,11 +429,14 @@ absl::Status ValidateContent(const TileKey& key, const TileContent& content,
   if (slots == 0 || slots > kTileCells || content.depths_m.size() != slots ||
       content.std_codes.size() != slots || content.times_s.size() != slots ||
       (!content.residual_codes.empty() &&
-       content.residual_codes.size() != slots)) {
+       content.residual_codes.size() != slots) ||
+      (!content.spread_codes.empty() && content.spread_codes.size() != slots) ||
+      content.hazard_slots.size() != content.hazards_m.size()) {
     return error("the arrays have different lengths");
   }
   std::uint32_t position = 0;
   bool residual_seen = content.residual_codes.empty();
+  bool spread_seen = content.spread_codes.empty();
   for (std::size_t i = 0; i < slots; ++i) {
     const int level = content.levels[i];
     if (level > span || position >= kTileCells ||
@@ -360,10 +451,14 @@ absl::Status ValidateContent(const TileKey& key, const TileContent& content,
                                       ? std::uint8_t{0}
                                       : content.residual_codes[i];
     residual_seen = residual_seen || residual != 0;
+    const std::uint8_t spread = content.spread_codes.empty()
+                                    ? std::uint8_t{0}
+                                    : content.spread_codes[i];
+    spread_seen = spread_seen || spread != 0;
     if ((code >> 14) == 0) {
       const bool child = code == kChildCode;
       if ((!child && code != 0) || std::bit_cast<std::uint32_t>(depth_m) != 0 ||
-          content.times_s[i] != 0 || residual != 0 ||
+          content.times_s[i] != 0 || residual != 0 || spread != 0 ||
           (child && (level != span || key.level + span >= max_level))) {
         return error(
             absl::StrFormat("slot %d without a leaf is not canonical", i));
@@ -376,6 +471,17 @@ absl::Status ValidateContent(const TileKey& key, const TileContent& content,
   }
   if (position != kTileCells) return error("the slots do not fill the tile");
   if (!residual_seen) return error("residual codes are kept but all zero");
+  if (!spread_seen) return error("spread codes are kept but all zero");
+  for (std::size_t i = 0; i < content.hazard_slots.size(); ++i) {
+    const std::uint16_t slot = content.hazard_slots[i];
+    const float hazard_m = content.hazards_m[i];
+    if (slot >= slots || (i > 0 && slot <= content.hazard_slots[i - 1]) ||
+        (content.std_codes[slot] >> 14) == 0 ||
+        !(hazard_m >= kMinChartDepthM && hazard_m <= kMaxChartDepthM)) {
+      return error(absl::StrFormat("hazard %d of %g m at slot %d does not fit",
+                                   i, hazard_m, slot));
+    }
+  }
   return absl::OkStatus();
 }
 

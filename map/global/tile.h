@@ -63,6 +63,11 @@ struct TileContent {
   std::vector<std::uint32_t> times_s;
   // Empty if all are 0.
   std::vector<std::uint8_t> residual_codes;
+  // Empty if all are 0.
+  std::vector<std::uint8_t> spread_codes;
+  // Indices of the slots with a hazard, ascending, and their hazard_m.
+  std::vector<std::uint16_t> hazard_slots;
+  std::vector<float> hazards_m;
 
   friend bool operator==(const TileContent&, const TileContent&) = default;
 };
@@ -74,7 +79,8 @@ struct TileTotals {
   std::uint64_t tiles = 0;
   std::uint64_t memory_bytes = 0;  // With allocator overhead (16 B a block).
   // Least and greatest depth that any known leaf stands for, its residual
-  // included; +inf and -inf if none is known. Uncertainty is not included.
+  // included, the least its hazard too; +inf and -inf if none is known.
+  // Uncertainty is not included.
   float shoalest_m = std::numeric_limits<float>::infinity();
   float deepest_m = -std::numeric_limits<float>::infinity();
 };
@@ -120,7 +126,7 @@ class Tile {
   template <typename Visitor>
   void ForEachSlot(Visitor visit) const;
 
-  // The leaf of a slot, residual too. REQUIRES: slot < slot_count().
+  // The leaf of a slot, with all its fields. REQUIRES: slot < slot_count().
   Leaf LeafAt(std::uint32_t slot) const;
   bool IsChild(std::uint32_t slot) const;
   // The child tile of a slot. REQUIRES: IsChild(slot).
@@ -150,14 +156,21 @@ class Tile {
   //   children shared pointers in Z-order
   //   blocks   for each divided block its 32 bits; and one more rank, that of
   //            the end
-  //   records  for each slot depth, code and time (10 bytes); without time (6
-  //            bytes) where all known leaves have one time and none is a child
+  //   records  for each slot depth (4 bytes), code (2) and time; the time takes
+  //            3 bytes, as seconds since time_s_ plus 1 (0: unknown); 4 bytes,
+  //            as it is, where the tile's span 194 days or more; none where all
+  //            known leaves have one time and none is a child
   //   residual codes, one byte for each slot, unless all are 0
-  // Fields lie at even addresses and are read with memcpy. A leaf is found in
-  // three lines of cache: this object's first, a block's, a record's.
+  //   spread codes, the same
+  //   hazards  slots (2 bytes each), then depths (4 bytes each)
+  //   a byte   so that a time of 3 bytes can be read with one load
+  // Fields are read with memcpy. A leaf is found in three lines of cache: this
+  // object's first, a block's, a record's.
   static constexpr std::size_t kBlockBytes = 4;
   static constexpr std::size_t kRecordBytes = 10;
+  static constexpr std::size_t kShortTimeBytes = 9;
   static constexpr std::size_t kTimelessBytes = 6;
+  static constexpr std::size_t kHazardBytes = 6;
 
   explicit Tile(const TileKey& key) : key_(key) {}
   static void* operator new(std::size_t size, std::size_t bytes_behind) {
@@ -174,6 +187,10 @@ class Tile {
   int LevelOf(std::uint32_t position) const;
   // The time of a leaf with the given record and code.
   std::uint32_t TimeOf(const std::byte* record, std::uint16_t std_code) const;
+  // The index of the child in the given record.
+  std::uint32_t ChildIndex(const std::byte* record) const;
+  // The fields of a slot that lie behind its record.
+  void LoadRest(std::uint32_t slot, Leaf& leaf) const;
 
   using Child = std::shared_ptr<const Tile>;
   const Child* Children() const {
@@ -190,7 +207,19 @@ class Tile {
   // From the blocks to the end.
   std::size_t ByteCount() const {
     return records_at_ - blocks_at_ +
-           slot_count_ * (record_bytes_ + (has_residuals_ ? 1u : 0u));
+           slot_count_ * (record_bytes_ + (has_residuals_ ? 1u : 0u) +
+                          (has_spreads_ ? 1u : 0u)) +
+           hazard_count_ * kHazardBytes;
+  }
+  const std::byte* Residuals() const { return Record(slot_count_); }
+  const std::byte* Spreads() const {
+    return Residuals() + (has_residuals_ ? slot_count_ : 0);
+  }
+  const std::byte* HazardSlots() const {
+    return Spreads() + (has_spreads_ ? slot_count_ : 0);
+  }
+  const std::byte* HazardDepths() const {
+    return HazardSlots() + hazard_count_ * sizeof(std::uint16_t);
   }
 
   std::uint64_t whole_ = 0;
@@ -202,8 +231,11 @@ class Tile {
   std::uint16_t child_count_ = 0;
   std::uint8_t record_bytes_ = kRecordBytes;
   bool has_residuals_ = false;
+  bool has_spreads_ = false;
   mutable bool settled_ = false;
-  // Of all known leaves, if the records hold none.
+  std::uint16_t hazard_count_ = 0;
+  // Of all known leaves, if the records hold none; the earliest that is known,
+  // if they hold 3 bytes.
   std::uint32_t time_s_ = 0;
   TileKey key_;
   TileTotals totals_;

@@ -4,6 +4,8 @@
 #include <cstring>
 #include <utility>
 
+#include "map/global/fuse.h"
+
 namespace fathom::map {
 
 WorkTile::WorkTile(const TileKey& its_key, const Leaf& leaf)
@@ -30,8 +32,10 @@ void WorkTile::Divide(std::uint32_t start) {
   const int level = levels[start] + 1;
   const std::uint32_t span = SpanOf(level);
   std::memset(&levels[start], level, std::size_t{4} * span);
-  for (std::uint32_t i = 1; i < 4; ++i)
+  leaves[start] = DividedLeaf(leaves[start]);
+  for (std::uint32_t i = 1; i < 4; ++i) {
     leaves[start + i * span] = leaves[start];
+  }
   modified = true;
 }
 

@@ -61,7 +61,8 @@ struct WorkTile {
     return children[leaves[start].time_s];
   }
 
-  // Replaces the leaf that begins at `start` by four with its value.
+  // Replaces the leaf that begins at `start` by four that inherit from it
+  // (DividedLeaf).
   // REQUIRES: its level < 6.
   void Divide(std::uint32_t start);
   // Replaces all slots of the cell of `level` that begins at `start` by one

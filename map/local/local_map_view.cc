@@ -83,6 +83,7 @@ DepthEstimate ToEstimate(const MeanVariance& read, EvidenceKind kind,
   return {.depth_m = static_cast<float>(read.mean_m),
           .std_m = std::max(std_m, kMinStdM),
           .kind = kind,
+          .soundings = evidence.count,
           .time_s = evidence.time_s,
           .shoalest_m = evidence.shoalest_m,
           .cell_size_m = static_cast<float>(cell_size_m)};

@@ -141,10 +141,28 @@ TransferResult ObstacleMap::TransferEvidence(OpenActivity& open) {
         result.degraded += written.degraded;
       });
   result.leaves_after_write = global_.View().known_leaf_count();
-  global_.Conglomerate();
+  global_.Conglomerate(MergeRule::kRange, OpenAreas(&open));
   global_view_ = global_.View();
   result.leaves_after = global_view_.known_leaf_count();
   return result;
+}
+
+std::vector<LatticeBox> ObstacleMap::OpenAreas(const OpenActivity* but) {
+  std::vector<LatticeBox> areas;
+  for (auto& [id, open] : open_) {
+    if (&open == but) continue;
+    const LocalMapView local = open.local.View();
+    const double cell_m = open.view.options.cell_size_m;
+    // A cell more to each side: a global cell may stand out of the area.
+    const double north_m = cell_m * (local.cells_north() + 1.0);
+    const double east_m = cell_m * (local.cells_east() + 1.0);
+    const NedFrame& frame = local.frame();
+    const auto box = options_.global.root.BoxAround(
+        {frame.ToGeodetic(-cell_m, -cell_m), frame.ToGeodetic(north_m, -cell_m),
+         frame.ToGeodetic(north_m, east_m), frame.ToGeodetic(-cell_m, east_m)});
+    if (box.has_value()) areas.push_back(*box);
+  }
+  return areas;
 }
 
 absl::StatusOr<TransferResult> ObstacleMap::Transfer(const ActivityId& id) {
@@ -170,6 +188,10 @@ absl::StatusOr<TransferResult> ObstacleMap::Complete(const ActivityId& id,
   TransferResult result;
   if (!discard) {
     result = TransferEvidence(open);
+  } else {
+    // What was kept for this activity need not be kept any more.
+    global_.Conglomerate(MergeRule::kRange, OpenAreas(&open));
+    global_view_ = global_.View();
   }
   open.view.cells_measured = open.local.View().cells_measured();
   open.view.local.reset();
@@ -192,7 +214,7 @@ absl::StatusOr<ImportResult> ObstacleMap::Import(const RasterBlock& block,
   result.cells_outside = imported.cells_outside;
   result.degraded = imported.degraded;
   if (last) {
-    global_.Conglomerate();
+    global_.Conglomerate(MergeRule::kRange, OpenAreas(nullptr));
   }
   global_view_ = global_.View();
   result.leaves_after = global_view_.known_leaf_count();

@@ -153,6 +153,10 @@ class ObstacleMap {
 
   // Moves the evidence of `open` into the global map.
   TransferResult TransferEvidence(OpenActivity& open);
+  // Where activities but `but` (none: null) are open: there the global map is
+  // not conglomerated, so that their evidence meets what was measured, and two
+  // vehicles' surveys of one place merge to the same map in either order.
+  std::vector<LatticeBox> OpenAreas(const OpenActivity* but);
   // Counts one applied event, with evidence of the given time.
   void Advance(Time evidence_time);
   // The activity's slot in activities_ takes the present view.

@@ -172,8 +172,9 @@ std::string ObstacleMapView::Digest() const {
   parts_.global.ForEachLeaf([&digest](const CellKey& key, const Leaf& leaf) {
     digest.Add(uint64_t{key.level} << 56 ^ uint64_t{key.row} << 28 ^ key.col);
     digest.Add(leaf.depth_m);
-    digest.Add(uint64_t{leaf.time_s} << 24 |
+    digest.Add(uint64_t{leaf.time_s} << 32 | uint64_t{leaf.spread_code} << 24 |
                uint64_t{leaf.residual_code} << 16 | leaf.std_code);
+    digest.Add(leaf.hazard_m);
   });
   for (const auto& activity : parts_.activities) {
     AddActivity(*activity, digest);

@@ -56,6 +56,11 @@ map::TileContent SampleTile(std::size_t leaves, bool residuals) {
         static_cast<std::uint32_t>(1'000'000'000u + random() % 600));
     if (residuals) {
       content.residual_codes.push_back(static_cast<std::uint8_t>(random()));
+      content.spread_codes.push_back(static_cast<std::uint8_t>(random()));
+      if (i % 100 == 7) {
+        content.hazard_slots.push_back(static_cast<std::uint16_t>(i));
+        content.hazards_m.push_back(static_cast<float>(random() % 100));
+      }
     }
   }
   return content;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <random>
 
+#include "map/global/fuse.h"
 #include "map/global/global_map.h"
 #include "tests/map/global/scene.h"
 
@@ -24,6 +25,40 @@ Leaf LeafOf(float depth_m, float std_m = 0.25f,
 
 std::array<Leaf, 4> Four(float a, float b, float c, float d) {
   return {LeafOf(a), LeafOf(b), LeafOf(c), LeafOf(d)};
+}
+
+TEST(JoinByRange, VariabilityStaysApartFromWhatIsNotKnownOfTheMean) {
+  std::array<Leaf, 4> four;
+  // Means 10, 10, 10.4, 10.4; variance of each 0.01, variability 0.09:
+  // predictive 0.1.
+  for (std::size_t i = 0; i < 4; ++i) {
+    four[i] = MakeLeaf(LeafKind::kMeasured, {.mean_m = i < 2 ? 10.0 : 10.4,
+                                             .variance_m2 = 0.01,
+                                             .variability_m2 = 0.09});
+  }
+  const auto joined = JoinFour(four, MergeRule::kRange, kTolerance);
+  ASSERT_TRUE(joined);
+  // About the mid-range 10.2: variance of the mean 0.01 + 0.2^2 = 0.05.
+  EXPECT_NEAR(joined->mean_std_m(), std::sqrt(0.05), 0.001);
+  EXPECT_NEAR(joined->variability_m(), 0.3, 0.01);
+  // Two roundings to a spread code.
+  EXPECT_NEAR(joined->std_m(), std::sqrt(0.14), 0.018 * 0.374);
+}
+
+TEST(JoinByRange, HazardsJoinOnlyWithHazardsAndTheShoalestStays) {
+  std::array<Leaf, 4> four;
+  four.fill(LeafOf(10, 0.25f));
+  four[2].hazard_m = 4.0f;
+  EXPECT_FALSE(JoinFour(four, MergeRule::kRange, kTolerance));
+  four[0].hazard_m = 3.0f;
+  four[1].hazard_m = 5.0f;
+  EXPECT_FALSE(JoinFour(four, MergeRule::kRange, kTolerance));
+  four[3].hazard_m = 6.0f;
+  for (const MergeRule rule : {MergeRule::kRange, MergeRule::kPairwise}) {
+    const auto joined = JoinFour(four, rule, kTolerance);
+    ASSERT_TRUE(joined);
+    EXPECT_EQ(joined->hazard_m, 3.0f);
+  }
 }
 
 TEST(JoinByRange, TakesTheMiddleOfTheRange) {

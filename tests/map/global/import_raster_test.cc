@@ -152,9 +152,11 @@ TEST_F(ImportRaster, ASecondChartIsFusedOrReplaces) {
   Import(Chart(20, 2));
   RasterBlock second = Chart(25, 1);
   Import(second);
-  // k = 4 / (4 + 1) = 0.8: 20 + 0.8 * 5 = 24; variance 0.2 * 4 = 0.8.
+  // k = 4 / (4 + 1) = 0.8: 20 + 0.8 * 5 = 24; variance of the mean 0.2 * 4 =
+  // 0.8. They are 5 m apart where two sigma are 2 sqrt(4 + 1) = 4.5: 0.8 * 0.2
+  // * (25 - 20) = 0.8 of variability. Together 1.6, right to a spread code.
   EXPECT_FLOAT_EQ(AtMiddle()->depth_m, 24.0f);
-  EXPECT_NEAR(AtMiddle()->std_m, std::sqrt(0.8), 0.9 * 0x1p-10);
+  EXPECT_NEAR(AtMiddle()->std_m, std::sqrt(1.6), 0.01 * 1.265);
   EXPECT_EQ(AtMiddle()->kind, EvidenceKind::kPrior);
   second.replace = true;
   Import(second);

@@ -59,7 +59,7 @@ TEST(TileLadder, KnowsWhichTilesAMapHas) {
 
 class TileLadderCost : public ::testing::TestWithParam<int> {};
 
-// A full tile of 4096 leaves of different times costs 10.1 B a leaf; a
+// A full tile of 4096 leaves of different times costs 9.1 B a leaf; a
 // surveyed square cuts tiles at its border and divides coarser leaves about
 // it. With tiles at 0/6/12/18 whatever the max_level, 7, 13 and 19 cost 55 B.
 TEST_P(TileLadderCost, ALeafStaysSmallAtEveryMaxLevel) {

@@ -94,7 +94,7 @@ TEST(Tile, AFullOneSpendsLittleOnItsShape) {
   EXPECT_LT(static_cast<double>(tile->totals().memory_bytes) / 4096, 6.11);
 }
 
-TEST(Tile, TimesThatDifferCostFourBytesALeaf) {
+TEST(Tile, TimesThatDifferCostThreeBytesALeafAndAYearApartFour) {
   Slots slots = RandomSlots(1, 1.0);
   const auto one = slots.Build();
   EXPECT_EQ(one->LeafAt(100).time_s, 7u);
@@ -102,10 +102,26 @@ TEST(Tile, TimesThatDifferCostFourBytesALeaf) {
   slots.leaves[100].time_s = 9;
   const auto two = slots.Build();
   EXPECT_EQ(two->totals().memory_bytes - one->totals().memory_bytes,
-            4u * 4096u);
+            3u * 4096u);
   EXPECT_EQ(two->LeafAt(100).time_s, 9u);
   EXPECT_EQ(two->LeafAt(101).time_s, 7u);
+  EXPECT_EQ(two->LeafAt(6).time_s, 0u);
   EXPECT_FALSE(one->SameSlots(*two));
+  // 2^24 - 2 seconds are the longest span of three bytes.
+  slots.leaves[100].time_s = 7 + 0xfffffe;
+  slots.leaves[102].time_s = 0;
+  const auto edge = slots.Build();
+  EXPECT_EQ(edge->totals().memory_bytes, two->totals().memory_bytes);
+  EXPECT_EQ(edge->LeafAt(100).time_s, 7u + 0xfffffe);
+  EXPECT_EQ(edge->LeafAt(101).time_s, 7u);
+  EXPECT_EQ(edge->LeafAt(102).time_s, 0u);
+  EXPECT_EQ(edge->Find(4095).leaf.time_s, slots.leaves[4095].time_s);
+  slots.leaves[100].time_s = 7 + 0xffffff;
+  const auto wide = slots.Build();
+  EXPECT_EQ(wide->totals().memory_bytes - one->totals().memory_bytes,
+            4u * 4096u);
+  EXPECT_EQ(wide->LeafAt(100).time_s, 7u + 0xffffff);
+  EXPECT_EQ(wide->LeafAt(101).time_s, 7u);
 }
 
 TEST(Tile, KeepsResidualsOnlyWhereThereAreAny) {
@@ -117,6 +133,37 @@ TEST(Tile, KeepsResidualsOnlyWhereThereAreAny) {
             4096u);
   EXPECT_EQ(with->LeafAt(100).residual_code, 9);
   EXPECT_EQ(with->LeafAt(101).residual_code, 0);
+}
+
+TEST(Tile, KeepsSpreadsAndHazardsOnlyWhereThereAreAny) {
+  Slots slots = RandomSlots(1, 1.0);
+  const auto without = slots.Build();
+  slots.leaves[4095].spread_code = 9;
+  const auto spread = slots.Build();
+  EXPECT_EQ(spread->totals().memory_bytes - without->totals().memory_bytes,
+            4096u);
+  // Six bytes a hazard.
+  slots.leaves[0].hazard_m = -2.5f;
+  slots.leaves[100].hazard_m = 3.25f;
+  slots.leaves[4095].hazard_m = 4.0f;
+  const auto hazards = slots.Build();
+  EXPECT_EQ(hazards->totals().memory_bytes - spread->totals().memory_bytes,
+            18u);
+  for (std::uint32_t slot = 0; slot < 4096; ++slot) {
+    ASSERT_EQ(hazards->LeafAt(slot), slots.leaves[slot]) << slot;
+    ASSERT_EQ(hazards->Find(slot).leaf, slots.leaves[slot]) << slot;
+  }
+  EXPECT_FALSE(hazards->SameSlots(*spread));
+  EXPECT_FALSE(spread->SameSlots(*without));
+}
+
+TEST(Tile, AHazardIsTheShoalestDepth) {
+  Slots slots{.levels = {1, 1, 1, 1},
+              .leaves = {Prior(10), Prior(12), Leaf{}, Prior(11)}};
+  slots.leaves[1].hazard_m = 2.5f;
+  const TileTotals totals = slots.Build()->totals();
+  EXPECT_EQ(totals.shoalest_m, 2.5f);
+  EXPECT_EQ(totals.deepest_m, 12.0f);
 }
 
 TEST(Tile, IsTheSameOnlyInEveryField) {
@@ -178,11 +225,17 @@ TEST(Tile, LeadsToItsChildren) {
 TEST(TileContent, RoundTripsThroughValidation) {
   for (std::uint32_t seed = 0; seed < 20; ++seed) {
     Slots slots = RandomSlots(seed, 0.85);
-    if (seed % 2 == 1) slots.leaves[0].residual_code = 200;
+    if (seed % 2 == 1) {
+      slots.leaves[0].residual_code = 200;
+      slots.leaves[0].spread_code = 30;
+      slots.leaves[0].hazard_m = 1.5f;
+    }
     const auto tile = slots.Build();
     const TileContent content = tile->Content();
     EXPECT_EQ(content.levels, slots.levels);
     EXPECT_EQ(content.residual_codes.empty(), seed % 2 == 0);
+    EXPECT_EQ(content.spread_codes.empty(), seed % 2 == 0);
+    EXPECT_EQ(content.hazard_slots.empty(), seed % 2 == 0);
     EXPECT_THAT(ValidateContent(TileKey{}, content, 24), IsOk());
   }
 }
@@ -250,6 +303,28 @@ TEST_F(BadContent, UnknownLeafWithAValue) {
 TEST_F(BadContent, ChildAboveTheFinestLevel) {
   content_.std_codes[2] = kChildCode;
   ExpectRefused("not canonical");
+}
+
+TEST_F(BadContent, SpreadsThatAreAllZero) {
+  content_.spread_codes.assign(4, 0);
+  ExpectRefused("all zero");
+}
+
+TEST_F(BadContent, HazardsThatDoNotFit) {
+  content_.hazard_slots = {2};  // Unknown.
+  content_.hazards_m = {1.0f};
+  ExpectRefused("does not fit");
+  content_.hazard_slots = {1, 0};  // Not ascending.
+  content_.hazards_m = {1.0f, 1.0f};
+  ExpectRefused("does not fit");
+  content_.hazard_slots = {4};  // No such slot.
+  content_.hazards_m = {1.0f};
+  ExpectRefused("does not fit");
+  content_.hazard_slots = {1};
+  content_.hazards_m = {std::numeric_limits<float>::infinity()};
+  ExpectRefused("does not fit");
+  content_.hazards_m = {};
+  ExpectRefused("different lengths");
 }
 
 TEST_F(BadContent, ResidualsThatAreAllZero) {
