@@ -117,6 +117,7 @@ int CheckLimits(const nlohmann::json& report) {
 
   Limit rocks("charted hazards answered FREE, per mille", 0.5);
   for (const auto& row : rows("hazards")) {
+    if (row["rocks"] == 0) continue;  // No chart here.
     rocks.Offer(1000 * row["free"].get<double>() / row["rocks"].get<double>(),
                 Where(row));
   }
