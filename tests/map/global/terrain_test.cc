@@ -1,6 +1,8 @@
 // The quadtree on real seabed: Woods Hole at 10 m (the shared test recordings;
 // skipped where they are absent). The figures are printed, and bounded.
 
+#include "tests/accuracy/terrain.h"
+
 #include <gdal_priv.h>
 #include <gtest/gtest.h>
 
@@ -12,6 +14,7 @@
 #include <vector>
 
 #include "map/global/global_map.h"
+#include "tests/accuracy/thesis_scene.h"
 #include "tests/map/global/scene.h"
 
 namespace fathom::map {
@@ -35,8 +38,7 @@ struct Terrain {
 class TerrainTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    const std::string path = std::string(FATHOM_SHARED_DATA_DIR) +
-                             "/bathymetry/woods_hole_buzzards_10m_utm19.tif";
+    const std::string& path = path_;
     if (!std::filesystem::exists(path)) {
       GTEST_SKIP() << "no " << path;
     }
@@ -80,86 +82,36 @@ class TerrainTest : public ::testing::Test {
     };
   }
 
+  const std::string path_ = std::string(FATHOM_SHARED_DATA_DIR) +
+                            "/bathymetry/woods_hole_buzzards_10m_utm19.tif";
   Terrain terrain_;
 };
-
-std::uint64_t Median(std::vector<std::uint64_t> values) {
-  std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
-}
 
 // Section 6.1.2: root 1267 nmi, min cell 10 m, local 500 m x 500 m at 10 m,
 // tolerance 0.5 m.
 TEST_F(TerrainTest, ThesisScene) {
-  const RootSquare root = ThesisSquare();
-  const NedFrame frame(Direct(kNarragansett, 30, 40000));
-  const auto area = Rectangle(frame, 0, 500, 0, 500);
-  std::vector<std::uint64_t> pairwise_leaves;
-  std::vector<std::uint64_t> range_leaves;
-  std::vector<std::uint64_t> range_bytes;
-  double range_worst_m = 0;
-  double pairwise_worst_m = 0;
-  for (int row = 0; row + 50 <= terrain_.rows; row += 37) {
-    for (int col = 0; col + 50 <= terrain_.columns; col += 33) {
-      const auto source = Window(frame, row, col, 50, 50);
-      bool wet = true;
-      for (int i = 0; i < 50 && wet; ++i) {
-        for (int j = 0; j < 50; ++j) {
-          wet = wet && terrain_.At(row + i, col + j) > 0;
-        }
-      }
-      if (!wet) continue;
-      for (const MergeRule rule : {MergeRule::kPairwise, MergeRule::kRange}) {
-        GlobalMap map({.root = root, .tolerance_m = 0.5});
-        map.MergeArea(area, kCellM, source);
-        const GlobalMapView fine = map.View();
-        map.Conglomerate(rule);
-        const GlobalMapView view = map.View();
-        double worst_m = 0;
-        fine.ForEachLeaf([&](const CellKey& cell, const Leaf& leaf) {
-          if (!leaf.known()) return;
-          worst_m = std::max(
-              worst_m,
-              std::abs(static_cast<double>(view.At(root.Center(cell))->depth_m -
-                                           leaf.depth_m)));
-        });
-        if (rule == MergeRule::kPairwise) {
-          pairwise_leaves.push_back(view.leaf_count());
-          pairwise_worst_m = std::max(pairwise_worst_m, worst_m);
-        } else {
-          range_leaves.push_back(view.leaf_count());
-          range_bytes.push_back(view.memory_bytes());
-          range_worst_m = std::max(range_worst_m, worst_m);
-        }
-      }
-    }
-  }
-  GlobalMap flat({.root = root});
-  flat.MergeArea(
-      area, kCellM,
-      [&frame](const GeodeticPoint& point) -> std::optional<DepthEstimate> {
-        const NedPoint p = frame.ToNed(point);
-        if (p.north_m < 0 || p.north_m >= 500 || p.east_m < 0 ||
-            p.east_m >= 500) {
-          return std::nullopt;
-        }
-        return Measured(10, 0.3f);
-      });
-  flat.Conglomerate();
+  const auto relief = accuracy::Terrain::FromRaster(path_, true);
+  ASSERT_TRUE(relief.ok()) << relief.status();
+  const accuracy::ThesisScene scene =
+      accuracy::MeasureThesisScene(*relief, 200);
+  const auto number = [](std::uint64_t value) {
+    return static_cast<unsigned long long>(value);
+  };
   std::printf(
-      "thesis scene, %zu wet windows of Woods Hole: fig. 4-18 %llu leaves, off "
-      "by up to %.2f m; by range %llu leaves, %llu bytes, off by up to %.2f m; "
-      "flat floor %llu leaves (thesis: 220 cells, 28200 bytes)\n",
-      range_leaves.size(),
-      static_cast<unsigned long long>(Median(pairwise_leaves)),
-      pairwise_worst_m, static_cast<unsigned long long>(Median(range_leaves)),
-      static_cast<unsigned long long>(Median(range_bytes)), range_worst_m,
-      static_cast<unsigned long long>(flat.leaf_count()));
-  ASSERT_GT(range_leaves.size(), 30u);
-  EXPECT_LT(Median(range_leaves), Median(pairwise_leaves));
-  EXPECT_LE(range_worst_m, 0.5 + 1e-5);
-  EXPECT_GT(pairwise_worst_m, 0.5);  // Why it is not the default.
-  EXPECT_LT(Median(range_bytes), 28200u);
+      "thesis scene, %d wet windows of Woods Hole: fig. 4-18 %llu leaves, off "
+      "by up to %.2f m; by range %llu leaves, %llu bytes (at most %llu), off "
+      "by up to %.2f m; flat floor %llu leaves (thesis: 220 cells, 28200 "
+      "bytes)\n",
+      scene.windows, number(scene.pairwise_median_leaves),
+      scene.pairwise_worst_m, number(scene.median_leaves),
+      number(scene.median_bytes), number(scene.most_bytes), scene.worst_m,
+      number(scene.flat_median_leaves));
+  ASSERT_EQ(scene.windows, 200);
+  EXPECT_LE(scene.median_leaves, 560u);
+  EXPECT_LT(scene.median_leaves, scene.pairwise_median_leaves);
+  EXPECT_LE(scene.worst_m, 0.5 + 1e-5);
+  EXPECT_GT(scene.pairwise_worst_m, 0.5);  // Why it is not the default.
+  EXPECT_LE(scene.median_bytes, 10'000u);
 }
 
 TEST_F(TerrainTest, ALeafCostsAtMostTwelveBytes) {
