@@ -29,7 +29,8 @@ enum BlockFlag : std::uint8_t {
   kHasPriorGrid = 2,
   kHasNervegna = 4,
   kHasPending = 8,
-  kAllBlockFlags = 15,
+  kHasPriorHazards = 16,
+  kAllBlockFlags = 31,
 };
 
 // One bit per cell, cell k in bit k % 8 of byte k / 8.
@@ -141,9 +142,13 @@ Bytes EncodeBlock(const BlockKey& key, const map::LocalBlock& block) {
   if (block.prior_grid != nullptr) flags |= kHasPriorGrid;
   if (!block.nervegna.empty()) flags |= kHasNervegna;
   if (!block.pending.empty()) flags |= kHasPending;
+  if (block.prior_grid != nullptr && !block.prior_grid->hazard_m.empty()) {
+    flags |= kHasPriorHazards;
+  }
   writer.PutU8(flags);
   writer.PutF32(block.uniform_prior.depth_m);
   writer.PutF32(block.uniform_prior.std_m);
+  writer.PutF32(block.uniform_prior.hazard_m);
   writer.PutU8(static_cast<std::uint8_t>(block.uniform_prior.kind));
   PutEvidence(block.evidence, writer);
   if (!block.transferred.empty()) PutEvidence(block.transferred, writer);
@@ -152,6 +157,7 @@ Bytes EncodeBlock(const BlockKey& key, const map::LocalBlock& block) {
     PutColumn(std::span<const float>(block.prior_grid->std_m), writer);
     static_assert(sizeof(map::EvidenceKind) == 1);
     PutColumnBytes(block.prior_grid->kind.data(), map::kBlockCells, 1, writer);
+    PutColumn(std::span<const float>(block.prior_grid->hazard_m), writer);
   }
   static_assert(sizeof(map::NervegnaCell) == 8);
   PutColumnBytes(block.nervegna.data(), block.nervegna.size(), 8, writer);
@@ -180,6 +186,7 @@ absl::StatusOr<map::LocalBlock> DecodeBlock(const BlockKey& key,
   map::LocalBlock block;
   block.uniform_prior.depth_m = reader.GetF32();
   block.uniform_prior.std_m = reader.GetF32();
+  block.uniform_prior.hazard_m = reader.GetF32();
   block.uniform_prior.kind = static_cast<map::EvidenceKind>(reader.GetU8());
   CheckKind(block.uniform_prior.kind, reader);
   GetEvidence(reader, block.evidence);
@@ -193,6 +200,10 @@ absl::StatusOr<map::LocalBlock> DecodeBlock(const BlockKey& key,
     GetColumnBytes(reader, map::kBlockCells, 4, grid->std_m.data());
     GetColumnBytes(reader, map::kBlockCells, 1, grid->kind.data());
     for (const map::EvidenceKind kind : grid->kind) CheckKind(kind, reader);
+    if ((flags & kHasPriorHazards) != 0) {
+      grid->hazard_m.resize(map::kBlockCells);
+      GetColumnBytes(reader, map::kBlockCells, 4, grid->hazard_m.data());
+    }
     block.prior_grid = std::move(grid);
   }
   if ((flags & kHasNervegna) != 0) {

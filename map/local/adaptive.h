@@ -27,8 +27,8 @@
 // The prior is fused by 4.18 and 4.20, but a prior that the evidence
 // contradicts is widened to the contradiction first (see FusePrior).
 //
-// The constants were chosen on five terrains (tests/accuracy/run). All functions
-// are pure and thread-safe; about 0.1 us with eight neighbours.
+// The constants were chosen on five terrains (tests/accuracy/run). All
+// functions are pure and thread-safe; about 0.1 us with eight neighbours.
 
 #ifndef FATHOM_MAP_LOCAL_ADAPTIVE_H_
 #define FATHOM_MAP_LOCAL_ADAPTIVE_H_

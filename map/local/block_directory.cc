@@ -38,8 +38,12 @@ void BlockDirectory::CountArrays(const LocalBlock& block, std::int64_t sign) {
       block.transferred.size() * sizeof(Evidence) +
       block.nervegna.size() * sizeof(NervegnaCell) +
       block.pending.size() * sizeof(PendingShoal) +
-      (block.prior_grid == nullptr ? 0 : sizeof(PriorGrid));
+      (block.prior_grid == nullptr
+           ? 0
+           : sizeof(PriorGrid) +
+                 block.prior_grid->hazard_m.size() * sizeof(float));
   array_bytes_ += static_cast<std::uint64_t>(sign) * bytes;
+  pending_count_ += static_cast<std::uint64_t>(sign) * block.pending.size();
 }
 
 }  // namespace fathom::map

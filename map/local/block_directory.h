@@ -54,6 +54,8 @@ class BlockDirectory {
 
   std::uint64_t block_count() const { return block_count_; }
   std::uint64_t cells_measured() const { return cells_measured_; }
+  // Soundings that wait for a second one.
+  std::uint64_t pending_count() const { return pending_count_; }
   std::uint64_t memory_bytes() const;
 
   // Writer only, and only on a directory of its own epoch. The block, copied
@@ -108,6 +110,7 @@ class BlockDirectory {
   std::uint64_t block_count_ = 0;
   std::uint64_t array_bytes_ = 0;  // What blocks hold outside themselves.
   std::uint64_t cells_measured_ = 0;
+  std::uint64_t pending_count_ = 0;
   std::vector<std::shared_ptr<SuperBlock>> supers_;
 };
 

@@ -17,6 +17,7 @@
 #include <compare>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -44,6 +45,9 @@ struct CellPrior {
   float depth_m = 0.0f;
   float std_m = 0.0f;
   EvidenceKind kind = EvidenceKind::kNone;
+  // A point hazard that was known before (DepthEstimate::hazard_m): not to be
+  // lost because this activity has not hit it yet. Infinite: none.
+  float hazard_m = std::numeric_limits<float>::infinity();
 
   friend bool operator==(const CellPrior&, const CellPrior&) = default;
 };
@@ -53,6 +57,8 @@ struct PriorGrid {
   std::array<float, kBlockCells> depth_m = {};
   std::array<float, kBlockCells> std_m = {};
   std::array<EvidenceKind, kBlockCells> kind = {};
+  // Empty where all are infinite; else 256.
+  std::vector<float> hazard_m;
 
   friend bool operator==(const PriorGrid&, const PriorGrid&) = default;
 };
@@ -90,7 +96,11 @@ struct LocalBlock {
 
   CellPrior prior(std::size_t k) const {
     if (prior_grid == nullptr) return uniform_prior;
-    return {prior_grid->depth_m[k], prior_grid->std_m[k], prior_grid->kind[k]};
+    CellPrior here = {.depth_m = prior_grid->depth_m[k],
+                      .std_m = prior_grid->std_m[k],
+                      .kind = prior_grid->kind[k]};
+    if (!prior_grid->hazard_m.empty()) here.hazard_m = prior_grid->hazard_m[k];
+    return here;
   }
   // All soundings of the cell, transferred or not.
   Evidence AllEvidence(std::size_t k) const {

@@ -73,9 +73,11 @@ CellPrior ToCellPrior(const std::optional<DepthEstimate>& estimate) {
       estimate->std_m <= 0.0f) {
     return {};
   }
-  return {.depth_m = estimate->depth_m,
-          .std_m = std::max(estimate->std_m, kMinStdM),
-          .kind = estimate->kind};
+  CellPrior prior = {.depth_m = estimate->depth_m,
+                     .std_m = std::max(estimate->std_m, kMinStdM),
+                     .kind = estimate->kind};
+  if (std::isfinite(estimate->hazard_m)) prior.hazard_m = estimate->hazard_m;
+  return prior;
 }
 
 bool HasDepth(const CellPrior& prior) {
@@ -198,6 +200,11 @@ void LocalMap::State::FillPrior(BlockIndex index, const PriorSource& prior,
       cells->depth_m[k] = here.depth_m;
       cells->std_m[k] = here.std_m;
       cells->kind[k] = here.kind;
+      if (std::isfinite(here.hazard_m)) {
+        cells->hazard_m.resize(kBlockCells,
+                               std::numeric_limits<float>::infinity());
+        cells->hazard_m[k] = here.hazard_m;
+      }
       if (k == 0) first = here;
       uniform = uniform && here == first;
     }

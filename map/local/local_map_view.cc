@@ -89,13 +89,18 @@ DepthEstimate ToEstimate(const MeanVariance& read, EvidenceKind kind,
           .cell_size_m = static_cast<float>(cell_size_m)};
 }
 
+// `known_hazard_m`: from before this activity; infinite or NaN: none.
 DepthEstimate FromAdaptive(const AdaptiveReading& read,
                            const Evidence& evidence,
-                           const PendingShoal* pending, double cell_size_m) {
+                           const PendingShoal* pending, float known_hazard_m,
+                           double cell_size_m) {
   DepthEstimate estimate = ToEstimate(read.predictive, EvidenceKind::kMeasured,
                                       evidence, cell_size_m);
   estimate.variability_m = static_cast<float>(std::sqrt(read.variability_m2));
   estimate.hazard_m = read.hazard_m;
+  if (std::isfinite(known_hazard_m)) {
+    estimate.hazard_m = std::fmin(estimate.hazard_m, known_hazard_m);
+  }
   if (pending != nullptr) {
     // fmin: of a NaN and a number the number.
     estimate.hazard_m = std::fmin(estimate.hazard_m, HazardDepth(*pending));
@@ -130,9 +135,10 @@ std::optional<DepthEstimate> ReadMeasured(const LocalGrid& grid,
     case EstimatorKind::kAdaptive: {
       Merged merged;
       const Neighbourhood cells = Around(grid, directory, cell, merged);
-      return FromAdaptive(
-          ReadAdaptive(cells, place.block->prior(place.k), cell_size_m),
-          *cells[kCenter], place.block->PendingAt(place.k), cell_size_m);
+      const CellPrior prior = place.block->prior(place.k);
+      return FromAdaptive(ReadAdaptive(cells, prior, cell_size_m),
+                          *cells[kCenter], place.block->PendingAt(place.k),
+                          prior.hazard_m, cell_size_m);
     }
   }
   return ToEstimate(read, EvidenceKind::kMeasured, evidence, cell_size_m);
@@ -271,10 +277,21 @@ std::optional<DepthEstimate> LocalMapView::EvidenceAt(
       Neighbourhood cells = Around(*grid_, *directory_, *cell, merged);
       cells[kCenter] = &evidence;
       return FromAdaptive(ReadAdaptive(cells, CellPrior{}, cell_size_m),
-                          evidence, nullptr, cell_size_m);
+                          evidence, nullptr, CellPrior{}.hazard_m, cell_size_m);
     }
   }
   return ToEstimate(read, EvidenceKind::kMeasured, evidence, cell_size_m);
+}
+
+float LocalMapView::PendingHazardAt(const GeodeticPoint& point) const {
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+  if (directory_ == nullptr || directory_->pending_count() == 0) return kNone;
+  const std::optional<CellIndex> cell = CellAt(point);
+  if (!cell.has_value()) return kNone;
+  const Place place = PlaceOf(*directory_, *cell);
+  if (place.block == nullptr) return kNone;
+  const PendingShoal* shoal = place.block->PendingAt(place.k);
+  return shoal == nullptr ? kNone : HazardDepth(*shoal);
 }
 
 void LocalMapView::ForEachMeasuredArea(

@@ -55,6 +55,10 @@ class LocalMapView {
   // As At, by index. nullopt outside the grid.
   std::optional<DepthEstimate> AtCell(CellIndex cell) const;
 
+  // hazard_m of a sounding that waits in the cell under the point for a second
+  // one (map/local/hazard.h), also where At() has no answer; NaN: none waits.
+  float PendingHazardAt(const GeodeticPoint& point) const;
+
   // What the soundings since the last transfer alone say, the prior left out:
   // what a transfer carries to the global map. kMeasured or nullopt. (For
   // `nervegna`, which keeps no variance apart from its prior, the std is the

@@ -1,5 +1,7 @@
 #include "map/obstacle_map/obstacle_map_view.h"
 
+#include <cmath>
+#include <limits>
 #include <utility>
 
 #include "map/obstacle_map/digest.h"
@@ -33,6 +35,7 @@ void AddBlock(BlockIndex index, const LocalBlock& block, Digest64& digest) {
     digest.Add(prior.depth_m);
     digest.Add(prior.std_m);
     digest.Add(static_cast<uint64_t>(prior.kind));
+    digest.Add(prior.hazard_m);
   }
   for (const Evidence& evidence : block.transferred) {
     AddEvidence(evidence, digest);
@@ -40,6 +43,12 @@ void AddBlock(BlockIndex index, const LocalBlock& block, Digest64& digest) {
   for (const NervegnaCell& cell : block.nervegna) {
     digest.Add(cell.mean_m);
     digest.Add(cell.variance_m2);
+  }
+  for (const PendingShoal& shoal : block.pending) {
+    digest.Add(shoal.depth_m);
+    digest.Add(shoal.std_m);
+    digest.Add(uint64_t{shoal.time_s} << 32 | uint64_t{shoal.cell} << 16 |
+               shoal.since);
   }
 }
 
@@ -108,6 +117,23 @@ const ActivityView* ObstacleMapView::FindActivity(const ActivityId& id) const {
 
 std::optional<SeabedEstimate> ObstacleMapView::SeabedAt(
     const GeodeticPoint& point, LayerChoice layers) const {
+  std::optional<SeabedEstimate> seabed;
+  // What waits for a second sounding where nothing was measured yet.
+  float hazard_m = std::numeric_limits<float>::quiet_NaN();
+  if (layers != LayerChoice::kGlobalOnly) {
+    for (const ActivityView* activity : open_newest_first_) {
+      hazard_m = std::fmin(hazard_m, activity->local->PendingHazardAt(point));
+    }
+  }
+  seabed = JoinLayers(point, layers);
+  if (seabed.has_value()) {
+    seabed->estimate.hazard_m = std::fmin(seabed->estimate.hazard_m, hazard_m);
+  }
+  return seabed;
+}
+
+std::optional<SeabedEstimate> ObstacleMapView::JoinLayers(
+    const GeodeticPoint& point, LayerChoice layers) const {
   std::optional<SeabedEstimate> smoothed;
   if (layers != LayerChoice::kGlobalOnly) {
     for (const ActivityView* activity : open_newest_first_) {
@@ -115,7 +141,8 @@ std::optional<SeabedEstimate> ObstacleMapView::SeabedAt(
       if (IsMeasured(local)) {
         return FromActivity(*local, *activity);
       }
-      if (local.has_value() && !smoothed.has_value()) {
+      if (local.has_value() &&
+          (!smoothed.has_value() || local->std_m < smoothed->estimate.std_m)) {
         smoothed = FromActivity(*local, *activity);
       }
     }

@@ -80,7 +80,7 @@ class ObstacleMapView {
 
   // The seabed under `point`. With kJoined the layers are joined so: a
   // measured cell of an open activity (the newest activity first), else a
-  // measured leaf of the global map, else a smoothed local cell, else the
+  // measured leaf of the global map, else the surest smoothed cell, else the
   // chart in the global map, else an activity's default prior. nullopt:
   // nothing covers the point (the answer is UNKNOWN).
   //
@@ -108,6 +108,10 @@ class ObstacleMapView {
   uint64_t memory_bytes() const;
 
  private:
+  // SeabedAt without the soundings that wait.
+  std::optional<SeabedEstimate> JoinLayers(const GeodeticPoint& point,
+                                           LayerChoice layers) const;
+
   Parts parts_;
   // Open activities, the newest first: the order in which points ask them.
   std::vector<const ActivityView*> open_newest_first_;

@@ -158,6 +158,9 @@ TEST(BlockCodec, TransferredPriorsAndNervegnaComeBack) {
   grid->depth_m[5] = -0.0f;
   grid->std_m.fill(2.0f);
   grid->kind.fill(map::EvidenceKind::kLand);
+  grid->hazard_m.assign(map::kBlockCells,
+                        std::numeric_limits<float>::infinity());
+  grid->hazard_m[9] = 3.5f;
   block.prior_grid = grid;
   block.nervegna.assign(
       map::kBlockCells,
@@ -171,11 +174,11 @@ TEST(BlockCodec, TransferredPriorsAndNervegnaComeBack) {
 }
 
 TEST(BlockCodec, UntouchedCellsTakeNoRoom) {
-  // Header 8, key 8, flags 1, prior 9, mask 32: 58; one touched cell adds its
-  // 24 planes of one element, two bytes each: 106.
+  // Header 8, key 8, flags 1, prior 13, mask 32: 62; one touched cell adds its
+  // 24 planes of one element, two bytes each: 110.
   const BlockKey key{.activity_number = 1, .index = {}};
-  EXPECT_EQ(EncodeBlock(key, SampleBlock(0)).size(), 58u);
-  EXPECT_EQ(EncodeBlock(key, SampleBlock(1)).size(), 106u);
+  EXPECT_EQ(EncodeBlock(key, SampleBlock(0)).size(), 62u);
+  EXPECT_EQ(EncodeBlock(key, SampleBlock(1)).size(), 110u);
 }
 
 TEST(BlockCodec, DamageNeverCrashes) {

@@ -100,6 +100,48 @@ TEST(ObstacleMap, AMeasuredCellStandsBeforeTheChart) {
       view->SeabedAt(Place(405, 405), LayerChoice::kLocalOnly).has_value());
 }
 
+ObstacleState StateAt(ObstacleMap& map, double depth_m) {
+  return map.View()
+      ->Answer({.position = Place(105, 105), .depth_m = depth_m, .time = At(9)})
+      .state;
+}
+
+// A rock once hit is not forgotten when the next vehicle surveys the place and
+// does not hit it.
+TEST(ObstacleMap, AHazardOutlivesTheActivityThatFoundIt) {
+  ObstacleMap map(SmallMission());
+  ASSERT_TRUE(map.Start(Survey("a", EstimatorKind::kAdaptive)).ok());
+  for (int n = 0; n < 9; ++n) {
+    ASSERT_TRUE(map.ApplyPing(HitAt("a", 105, 105, 20, 0.1f, n)).ok());
+  }
+  ASSERT_TRUE(map.ApplyPing(HitAt("a", 105, 105, 15, 0.1f, 9)).ok());
+  EXPECT_EQ(StateAt(map, 15), ObstacleState::kUncertain);
+  ASSERT_TRUE(map.Complete(ActivityId{"a"}, false).ok());
+  EXPECT_EQ(StateAt(map, 15), ObstacleState::kUncertain);
+  ASSERT_TRUE(map.Start(Survey("b", EstimatorKind::kAdaptive)).ok());
+  for (int n = 0; n < 50; ++n) {
+    ASSERT_TRUE(map.ApplyPing(HitAt("b", 105, 105, 20, 0.1f, n)).ok());
+  }
+  EXPECT_EQ(StateAt(map, 15), ObstacleState::kUncertain);
+  EXPECT_EQ(StateAt(map, 10), ObstacleState::kFree);
+}
+
+// Hit for the first time where only a chart knows better: held back as gross,
+// yet the chart alone may not call the place free.
+TEST(ObstacleMap, AShoalThatWaitsMakesTheChartsAnswerUncertain) {
+  ObstacleMap map(SmallMission());
+  ASSERT_TRUE(map.Import(FlatChart(60, 1), true).ok());
+  ASSERT_TRUE(map.Start(Survey("a", EstimatorKind::kAdaptive)).ok());
+  for (const double east_m : {95.0, 105.0, 115.0}) {
+    ASSERT_TRUE(map.ApplyPing(HitAt("a", 95, east_m, 60, 0.1f, 1)).ok());
+  }
+  EXPECT_EQ(StateAt(map, 10), ObstacleState::kFree);
+  const std::string before = map.View()->Digest();
+  ASSERT_TRUE(map.ApplyPing(HitAt("a", 105, 105, 3, 0.1f, 2)).ok());
+  EXPECT_EQ(StateAt(map, 10), ObstacleState::kUncertain);
+  EXPECT_NE(map.View()->Digest(), before);
+}
+
 TEST(ObstacleMap, TransferCountsThePriorOnce) {
   ObstacleMap map(SmallMission());
   ASSERT_TRUE(map.Import(FlatChart(24, 4), true).ok());
