@@ -84,8 +84,11 @@ absl::StatusOr<std::unique_ptr<Client>> Client::Connect(
                                  options.connect_timeout)) {
     return absl::UnavailableError(absl::StrFormat(
         "no Fathom server answers at %s within %d ms: is fathomd running "
-        "there?",
-        address, options.connect_timeout.count()));
+        "there%s?",
+        address, options.connect_timeout.count(),
+        options.credentials != nullptr
+            ? ", for this name and authority, and does it know our certificate"
+            : ", and does it speak plain text"));
   }
   return std::unique_ptr<Client>(
       new Client(address, options, std::move(channel)));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 namespace fathom::client::cli {
 namespace {
@@ -81,6 +82,26 @@ Colormap Colormap::Depth() {
 Colormap Colormap::Std() {
   return Colormap({Hex(0xfdf6e3), Hex(0xfbdcae), Hex(0xf5b37d), Hex(0xe6825f),
                    Hex(0xc7556a), Hex(0x923c73), Hex(0x5a2b66), Hex(0x2a1a40)});
+}
+
+Colormap Colormap::Age() {
+  return Colormap({Hex(0xfbfbe0), Hex(0xdcefbc), Hex(0xa6d8a6), Hex(0x6bbb9b),
+                   Hex(0x3b9890), Hex(0x26707c), Hex(0x1d475f), Hex(0x14213d)});
+}
+
+Colormap Colormap::Difference() {
+  // Two maps that meet in the middle.
+  const Colormap down({Hex(0xf6f6f4), Hex(0xf9d9b0), Hex(0xf0a95f),
+                       Hex(0xd67a27), Hex(0xa5520f), Hex(0x6e3207)});
+  const Colormap up({Hex(0xf6f6f4), Hex(0xc9dff0), Hex(0x8fbfe0), Hex(0x4f97c9),
+                     Hex(0x256da6), Hex(0x12406f)});
+  Colormap both;
+  for (int i = 0; i < kTableSize; ++i) {
+    const int from_middle = 2 * i - (kTableSize - 1);
+    const auto at = static_cast<std::size_t>(std::abs(from_middle));
+    both.table_.push_back(from_middle < 0 ? down.table_[at] : up.table_[at]);
+  }
+  return both;
 }
 
 Color Colormap::At(double t, double shade) const {

@@ -33,6 +33,11 @@ class Colormap {
   static Colormap Depth();
   // Certain pale, uncertain dark violet.
   static Colormap Std();
+  // New pale, old dark green.
+  static Colormap Age();
+  // Shoaler orange, equal nearly white, deeper blue: both ends equally dark,
+  // apart for every kind of colour blindness.
+  static Colormap Difference();
 
   // The colour at `t`, clamped to [0, 1]; `shade` multiplies the lightness.
   Color At(double t, double shade = 1) const;
@@ -41,6 +46,7 @@ class Colormap {
   // Hue and chroma come from the stops, lightness runs evenly between the
   // first and the last.
   explicit Colormap(const std::vector<Color>& stops);
+  Colormap() = default;
 
   std::vector<OkLab> table_;
 };

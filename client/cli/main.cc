@@ -34,7 +34,8 @@ Exit codes:
   0  done
   1  the command line is wrong (nothing was sent)
   2  the server said no (the reason is printed)
-  3  no server answered (is fathomd running? --server, $FATHOM_SERVER)
+  3  no server answered (is fathomd running? --server, $FATHOM_SERVER; behind
+     TLS: --tls-ca, --tls-cert, --tls-key)
   4  a file given is missing, damaged or not usable)";
 
 int Report(const Session& session, const absl::Status& status) {
@@ -72,6 +73,19 @@ int Main(int argc, char** argv) {
                  "Give up a call after this many seconds (default: 10, and "
                  "600 for imports, transfers and areas)")
       ->check(CLI::PositiveNumber);
+  app.add_option("--tls-ca", session.tls_ca,
+                 "PEM file of the authority that signed the server's "
+                 "certificate; speaks TLS instead of plain text")
+      ->envname("FATHOM_TLS_CA")
+      ->type_name("FILE");
+  app.add_option("--tls-cert", session.tls_cert,
+                 "PEM file of our certificate, for servers that ask for one; "
+                 "with --tls-key")
+      ->envname("FATHOM_TLS_CERT")
+      ->type_name("FILE");
+  app.add_option("--tls-key", session.tls_key, "PEM file of its private key")
+      ->envname("FATHOM_TLS_KEY")
+      ->type_name("FILE");
   app.add_flag("--json", session.json, "Print one JSON document");
   app.set_version_flag("--version", std::string(FATHOM_VERSION));
   AddStatus(app, session);

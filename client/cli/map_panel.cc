@@ -12,10 +12,6 @@
 namespace fathom::client::cli {
 namespace {
 
-// Shores and contours are drawn for grids up to this size; above it a cell is
-// far below a pixel.
-constexpr std::size_t kMaxOutlinedCells = 4'000'000;
-
 bool IsLand(const Region& region, std::size_t index) {
   return region.kind[index] == v1::EVIDENCE_KIND_LAND;
 }
@@ -174,58 +170,6 @@ void MapPanel::DrawShore() {
   cairo_stroke(cairo);
 }
 
-void MapPanel::DrawContours(const std::vector<float>& values,
-                            const std::vector<double>& levels) {
-  if (values.size() > kMaxOutlinedCells) return;
-  cairo_t* cairo = canvas_.cairo();
-  const double cell_x = frame_.width / region_.columns;
-  const double cell_y = frame_.height / region_.rows;
-  cairo_save(cairo);
-  ClipToFrame();
-  for (const double level : levels) {
-    for (std::uint32_t row = 0; row + 1 < region_.rows; ++row) {
-      for (std::uint32_t column = 0; column + 1 < region_.columns; ++column) {
-        // Marching squares between four cell middles: the edges that the
-        // level crosses, in order around the square.
-        const std::array<std::pair<int, int>, 4> kCorner = {
-            {{0, 0}, {0, 1}, {1, 1}, {1, 0}}};
-        std::array<double, 4> v;
-        bool known = true;
-        for (std::size_t k = 0; k < 4; ++k) {
-          const auto [down, right] = kCorner[k];
-          const float value =
-              values[region_.Index(row + static_cast<std::uint32_t>(down),
-                                   column + static_cast<std::uint32_t>(right))];
-          known = known && std::isfinite(value);
-          v[k] = value - level;
-        }
-        if (!known) continue;
-        std::array<Point, 4> crossing;
-        std::size_t crossings = 0;
-        for (std::size_t k = 0; k < 4; ++k) {
-          const std::size_t next = (k + 1) % 4;
-          if ((v[k] < 0) == (v[next] < 0)) continue;
-          const double t = v[k] / (v[k] - v[next]);
-          const double right = kCorner[k].second +
-                               t * (kCorner[next].second - kCorner[k].second);
-          const double down =
-              kCorner[k].first + t * (kCorner[next].first - kCorner[k].first);
-          crossing[crossings++] = {frame_.x + (column + 0.5 + right) * cell_x,
-                                   frame_.y + (row + 0.5 + down) * cell_y};
-        }
-        for (std::size_t k = 0; k + 1 < crossings; k += 2) {
-          cairo_move_to(cairo, crossing[k].x, crossing[k].y);
-          cairo_line_to(cairo, crossing[k + 1].x, crossing[k + 1].y);
-        }
-      }
-    }
-  }
-  canvas_.SetColor({0.05, 0.1, 0.25}, 0.35);
-  cairo_set_line_width(cairo, 0.8);
-  cairo_stroke(cairo);
-  cairo_restore(cairo);
-}
-
 void MapPanel::DrawGraticule() {
   cairo_t* cairo = canvas_.cairo();
   const double width_deg = region_.longitude_step_deg * region_.columns;
@@ -242,10 +186,15 @@ void MapPanel::DrawGraticule() {
     canvas_.SetColor(kFrameColor);
     canvas_.Line(x, frame_.y + frame_.height, x, frame_.y + frame_.height + 5,
                  1);
-    TextStyle style = small;
-    style.align = Align::kCenter;
-    canvas_.Text(AngleText(WrapLongitude(mark), column_step, 'E', 'W'), x,
-                 frame_.y + frame_.height + 20, style);
+    // Within the frame's width, clear of the next panel's.
+    const std::string text =
+        AngleText(WrapLongitude(mark), column_step, 'E', 'W');
+    const double width = canvas_.TextWidth(text, small);
+    canvas_.Text(
+        text,
+        std::clamp(x - width / 2, frame_.x,
+                   std::max(frame_.x, frame_.x + frame_.width - width)),
+        frame_.y + frame_.height + 20, small);
   }
   const double row_step = GraticuleStep(height_deg, 6);
   for (const double mark : Multiples(row_step, north - height_deg, north)) {

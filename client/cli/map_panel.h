@@ -4,6 +4,7 @@
 #ifndef FATHOM_CLIENT_CLI_MAP_PANEL_H_
 #define FATHOM_CLIENT_CLI_MAP_PANEL_H_
 
+#include <cstddef>
 #include <functional>
 #include <string>
 #include <vector>
@@ -23,6 +24,10 @@ inline constexpr Color kTrackColor = {0.93, 0.36, 0.13};
 inline constexpr Color kContactColor = {0.72, 0.07, 0.38};
 inline constexpr Color kWhiteColor = {1, 1, 1};
 
+// Shores and contours are drawn for grids up to this size; above it a cell is
+// far below a pixel.
+inline constexpr std::size_t kMaxOutlinedCells = 4'000'000;
+
 class MapPanel {
  public:
   // Draws `region` into `frame` of `canvas`; both must outlive this. The
@@ -38,9 +43,11 @@ class MapPanel {
 
   // Hatching, then all known cells, then land and its shore.
   void DrawCells(const CellColor& color_of);
-  // Depth contours at the scale's ticks.
+  // Contours at these levels; their labels are chosen here and written by
+  // DrawContourLabels, above what is drawn between.
   void DrawContours(const std::vector<float>& values,
                     const std::vector<double>& levels);
+  void DrawContourLabels();
   // The frame with marks of latitude and longitude.
   void DrawGraticule();
   void DrawTrack(const std::vector<v1::GeodeticPoint>& track);
@@ -55,6 +62,19 @@ class MapPanel {
     double x = 0;
     double y = 0;
   };
+  struct ContourLabel {
+    std::string text;
+    Point at;          // Middle.
+    double angle = 0;  // Of the line, radians.
+    double half_width = 0;
+  };
+  // Chooses places along one line; `along` are the lengths up to each point.
+  void AddContourLabels(const std::string& text,
+                        const std::vector<Point>& points,
+                        const std::vector<double>& along);
+  // Whether a label about `middle` lies inside, clear of all else.
+  bool IsFree(const Point& middle, double width) const;
+
   Point ToPixel(const v1::GeodeticPoint& place) const;
   void ClipToFrame();
   void DrawShore();
@@ -71,6 +91,7 @@ class MapPanel {
   double meters_per_pixel_ = 0;
   // Where names stand, by their baselines.
   std::vector<Rectangle> labels_;
+  std::vector<ContourLabel> contour_labels_;
 };
 
 }  // namespace fathom::client::cli

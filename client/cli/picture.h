@@ -1,5 +1,9 @@
-// The map as a picture: depth (with relief, contours, track and contacts) and
-// std side by side, each with its scale, on one PNG.
+// The map as a picture: one to four panels on one PNG, each with its scale or
+// key, all with the same area: depth (relief, labelled contours, track and
+// contacts), std, age, what stands behind each cell, and the difference to
+// another map. Every colour scale has a lightness that tells the value, and
+// the categories are Okabe and Ito's, so that colour-blind eyes and grey
+// prints tell them apart.
 //
 // Land is tan, what nobody knows is hatched grey, so that neither is taken for
 // water. The projection is equirectangular with true lengths at the area's
@@ -13,13 +17,25 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "client/cli/cell_layers.h"
 #include "client/region.h"
 #include "fathom/v1/types.pb.h"
 
 namespace fathom::client::cli {
 
+enum class PanelKind { kDepth, kStd, kAge, kLayer, kDifference };
+
 struct PictureInput {
   Region region;
+  // Left to right, then down; 1 to 4, each at most once.
+  std::vector<PanelKind> panels = {PanelKind::kDepth, PanelKind::kStd};
+  // For kLayer: one per cell.
+  std::vector<CellLayer> layers;
+  // For kDifference: this map's depth less the other's, metres, one per cell;
+  // NaN: one of them does not know it.
+  std::vector<float> difference_m;
+  // What the other map is called.
+  std::string against;
   std::string title;
   // One line below it: mission, revision, time.
   std::string subtitle;
@@ -34,7 +50,8 @@ struct PictureInput {
   int width_px = 1800;
 };
 
-// Writes the picture. Errors: INVALID_ARGUMENT (width, an area too slender to
+// Writes the picture. Errors: INVALID_ARGUMENT (width, panels without their
+// values, an area too slender to
 // draw, a file that cannot be written).
 absl::Status DrawPicture(const PictureInput& input, const std::string& path);
 

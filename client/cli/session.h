@@ -27,9 +27,17 @@ struct Session {
   // Bounds each call; 0: the library's defaults.
   double timeout_s = 0;
   bool json = false;
+  // PEM files. Any of them: TLS instead of plain text. tls_cert and tls_key
+  // are ours, where the server asks who we are; tls_ca signs the server's
+  // (empty: the system's authorities).
+  std::string tls_ca;
+  std::string tls_cert;
+  std::string tls_key;
   // Set by the verb that the command line names.
   std::function<absl::Status()> run = nullptr;
 
+  // Errors: as Client::Connect; INVALID_ARGUMENT marked as the user's (a
+  // certificate without its key) or NOT_FOUND as the file's.
   absl::StatusOr<std::unique_ptr<Client>> Connect() const;
   Time Now() const;
 };

@@ -129,7 +129,9 @@ TEST_F(CliTest, UsageIsOneAndNothingIsSent) {
         "query --at 1,2", "query --at 1,2 --depth-m x",
         "query --at 1,2 --depth-m 3 --time yesterday",
         "activity start a --size-m 5", "contacts drop nameless", "export",
-        "export -o x --bands salt", "export -o x --format png"}) {
+        "export -o x --bands salt", "export -o x --format png",
+        "render --show salt", "render --show difference",
+        "--tls-cert /dev/null status"}) {
     EXPECT_EQ(Run(wrong).code, 1) << wrong;
   }
   EXPECT_EQ(server_.calls("QueryObstacle"), 0);
@@ -147,6 +149,19 @@ TEST_F(CliTest, BadFileIsFour) {
   EXPECT_EQ(Run("query --points-file /nonexistent.csv").code, 4);
   EXPECT_EQ(Run("query --points-file - <<'EOF'\n1,x,3\nEOF\n").code, 4);
   EXPECT_EQ(Run("render --track /nonexistent.csv").code, 4);
+}
+
+TEST_F(CliTest, TlsFilesAreReadAndAPlainServerDoesNotAnswerThem) {
+  EXPECT_EQ(Run("--tls-ca /nonexistent.pem status").code, 4);
+  EXPECT_EQ(Run("--tls-ca " FATHOM_CLI " status").code, 4);
+  std::string folder =
+      std::filesystem::temp_directory_path() / "fathom_cli_tls.XXXXXX";
+  ASSERT_NE(mkdtemp(folder.data()), nullptr);
+  std::ofstream(folder + "/ca.pem")
+      << "-----BEGIN CERTIFICATE-----\n-----END CERTIFICATE-----\n";
+  EXPECT_EQ(Run("--timeout-s 0.3 --tls-ca " + folder + "/ca.pem status").code,
+            3);
+  std::filesystem::remove_all(folder);
 }
 
 TEST_F(CliTest, HelpTeachesWithExamplesAndExitCodes) {

@@ -11,6 +11,8 @@
 #include <filesystem>
 
 #include "client/cli/colormap.h"
+#include "client/cli/contour_lines.h"
+#include "client/cli/map_legend.h"
 #include "client/cli/map_panel.h"
 #include "client/cli/relief_shading.h"
 #include "tests/testing/status_matchers.h"
@@ -147,6 +149,115 @@ TEST_F(PictureTest, ContactStandsAtItsPlaceWithItsEllipse) {
   EXPECT_EQ(At(x - 6, y - 0.12 * kWidth), north_before);
 }
 
+TEST_F(PictureTest, LayersAgesAndDifferencesHaveTheirColours) {
+  PictureInput input;
+  input.region = MakeRegion();
+  // Columns 0-4 local, 5-9 global, 10-14 smoothed, 15-19 chart; of these the
+  // charted have no age.
+  for (std::size_t i = 0; i < 1600; ++i) {
+    const std::size_t column = i % 40;
+    input.layers.push_back(column < 5    ? CellLayer::kLocal
+                           : column < 10 ? CellLayer::kGlobal
+                           : column < 15 ? CellLayer::kSmoothed
+                           : column < 20 ? CellLayer::kPrior
+                           : column < 30 ? CellLayer::kLand
+                                         : CellLayer::kUnknown);
+    if (column < 15) input.region.age_s[i] = static_cast<float>(column) * 3600;
+    // Shoaler in the west, deeper in the east, each by up to 2 m.
+    input.difference_m.push_back(
+        column < 20 ? (static_cast<float>(column) - 9.5f) * 0.2f
+                    : std::nanf(""));
+    // Flat: no shade.
+    if (column < 20) input.region.depth_m[i] = 10;
+  }
+  input.against = "other.tif";
+  input.panels = {PanelKind::kLayer, PanelKind::kAge, PanelKind::kDifference,
+                  PanelKind::kDepth};
+  Draw(input);
+  ASSERT_NE(image_, nullptr);
+  const double right = kLeft + kWidth + 34 + 26;
+  // Blocks: panel, 40 for longitudes, 66 for the bar, 24 between rows.
+  const double shape = MapPanel::HeightPerWidth(input.region);
+  const double below = kTop + kWidth * shape + 40 + 66 + 24;
+  const auto at = [&](double left, double top, double column) {
+    return At(left + (column + 0.5) / 40 * kWidth, top + 0.31 * kWidth);
+  };
+  const auto near = [](std::uint32_t rgb, const Color& color) {
+    return std::abs((rgb >> 16 & 0xff) / 255.0 - color.red) < 0.02 &&
+           std::abs((rgb >> 8 & 0xff) / 255.0 - color.green) < 0.02 &&
+           std::abs((rgb & 0xff) / 255.0 - color.blue) < 0.02;
+  };
+  EXPECT_TRUE(near(at(kLeft, kTop, 2), *LayerColor(CellLayer::kLocal)));
+  EXPECT_TRUE(near(at(kLeft, kTop, 7), *LayerColor(CellLayer::kGlobal)));
+  EXPECT_TRUE(near(at(kLeft, kTop, 12), *LayerColor(CellLayer::kSmoothed)));
+  EXPECT_TRUE(near(at(kLeft, kTop, 17), *LayerColor(CellLayer::kPrior)));
+  EXPECT_EQ(at(kLeft, kTop, 25), 0xe5d6b6u);  // Land.
+  const auto lightness = [](std::uint32_t rgb) {
+    return ToOkLab({(rgb >> 16 & 0xff) / 255.0, (rgb >> 8 & 0xff) / 255.0,
+                    (rgb & 0xff) / 255.0})
+        .lightness;
+  };
+  // Older is darker; the charted are one grey, not the hatch of the unknown.
+  EXPECT_GT(lightness(at(right, kTop, 1)), lightness(at(right, kTop, 8)) + 0.1);
+  EXPECT_GT(lightness(at(right, kTop, 8)),
+            lightness(at(right, kTop, 13)) + 0.1);
+  EXPECT_EQ(at(right, kTop, 16), at(right, kTop, 18));
+  EXPECT_NE(at(right, kTop, 16), at(right, kTop, 13));
+  // Orange where shoaler, blue where deeper, nearly white between.
+  const std::uint32_t shoaler = at(kLeft, below, 1);
+  const std::uint32_t deeper = at(kLeft, below, 18);
+  EXPECT_GT(shoaler >> 16 & 0xff, (shoaler & 0xff) + 60);
+  EXPECT_GT(deeper & 0xff, (deeper >> 16 & 0xff) + 60);
+  EXPECT_GT(lightness(at(kLeft, below, 9)), 0.9);
+}
+
+TEST_F(PictureTest, PanelsWithoutValuesAndTooManyAreRefused) {
+  PictureInput input;
+  input.region = MakeRegion();
+  input.panels = {PanelKind::kLayer};
+  EXPECT_THAT(DrawPicture(input, folder_ + "/x.png"),
+              StatusIs(absl::StatusCode::kInvalidArgument,
+                       HasSubstr("without its values")));
+  input.panels = {};
+  EXPECT_THAT(DrawPicture(input, folder_ + "/x.png"),
+              StatusIs(absl::StatusCode::kInvalidArgument));
+}
+
+TEST(TraceContour, RampGivesOneStraightLine) {
+  // 3 x 4 cells rising by 1 to the east from 0: 1.25 lies a quarter beyond the
+  // second middle, at x = 1.5 + 0.25.
+  std::vector<float> values;
+  for (int i = 0; i < 12; ++i) values.push_back(static_cast<float>(i % 4));
+  const std::vector<ContourLine> lines = TraceContour(values, 3, 4, 1.25);
+  ASSERT_EQ(lines.size(), 1u);
+  ASSERT_EQ(lines[0].points.size(), 3u);
+  for (const GridPoint& p : lines[0].points) EXPECT_DOUBLE_EQ(p.x, 1.75);
+  EXPECT_DOUBLE_EQ(std::abs(lines[0].points[2].y - lines[0].points[0].y), 2);
+}
+
+TEST(TraceContour, HillGivesAClosedLineAndUnknownBreaksIt) {
+  std::vector<float> values(25, 0);
+  values[12] = 4;
+  const std::vector<ContourLine> lines = TraceContour(values, 5, 5, 1);
+  ASSERT_EQ(lines.size(), 1u);
+  // A diamond of four crossings, three quarters of a cell from the top.
+  ASSERT_EQ(lines[0].points.size(), 5u);
+  EXPECT_DOUBLE_EQ(lines[0].points[0].x, lines[0].points[4].x);
+  EXPECT_DOUBLE_EQ(lines[0].points[0].y, lines[0].points[4].y);
+  for (const GridPoint& p : lines[0].points) {
+    EXPECT_DOUBLE_EQ(std::abs(p.x - 2.5) + std::abs(p.y - 2.5), 0.75);
+  }
+  values[6] = std::nanf("");  // North-west of the top.
+  const std::vector<ContourLine> open = TraceContour(values, 5, 5, 1);
+  ASSERT_EQ(open.size(), 1u);
+  EXPECT_EQ(open[0].points.size(), 4u);
+  // Two tops that touch in a saddle: each has its own line.
+  std::vector<float> saddle(36, 0);
+  saddle[14] = saddle[21] = 4;
+  EXPECT_EQ(TraceContour(saddle, 6, 6, 1).size(), 1u);
+  EXPECT_EQ(TraceContour(saddle, 6, 6, -1).size(), 0u);
+}
+
 TEST_F(PictureTest, WrongSizesAndPlacesAreRefused) {
   PictureInput input;
   input.region = MakeRegion();
@@ -165,7 +276,8 @@ TEST_F(PictureTest, WrongSizesAndPlacesAreRefused) {
 }
 
 TEST(Colormap, LightnessFallsEvenly) {
-  for (const Colormap& map : {Colormap::Depth(), Colormap::Std()}) {
+  for (const Colormap& map :
+       {Colormap::Depth(), Colormap::Std(), Colormap::Age()}) {
     const double step =
         ToOkLab(map.At(0)).lightness - ToOkLab(map.At(0.25)).lightness;
     EXPECT_GT(step, 0.1);
