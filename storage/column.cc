@@ -126,6 +126,42 @@ void Join<kVector>(const std::uint8_t* planes, std::size_t count,
   }
 }
 
+// The low and the high half of two registers, byte by byte.
+Vector LowBytes(Vector a, Vector b) {
+  return __builtin_shufflevector(a, b, 0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21,
+                                 6, 22, 7, 23);
+}
+Vector HighBytes(Vector a, Vector b) {
+  return __builtin_shufflevector(a, b, 8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13,
+                                 29, 14, 30, 15, 31);
+}
+
+// Width 4, depths and times of tiles: a quarter of a start was byte after byte.
+template <>
+void Join<4>(const std::uint8_t* planes, std::size_t count,
+             std::uint8_t* elements) {
+  std::size_t i = 0;
+  for (; i + kVector <= count; i += kVector) {
+    Vector plane[4];
+    for (std::size_t k = 0; k < 4; ++k) {
+      std::memcpy(&plane[k], planes + k * count + i, kVector);
+    }
+    const Vector even_low = LowBytes(plane[0], plane[2]);
+    const Vector even_high = HighBytes(plane[0], plane[2]);
+    const Vector odd_low = LowBytes(plane[1], plane[3]);
+    const Vector odd_high = HighBytes(plane[1], plane[3]);
+    const Vector joined[4] = {
+        LowBytes(even_low, odd_low), HighBytes(even_low, odd_low),
+        LowBytes(even_high, odd_high), HighBytes(even_high, odd_high)};
+    std::memcpy(elements + 4 * i, joined, sizeof(joined));
+  }
+  for (; i < count; ++i) {
+    for (std::size_t k = 0; k < 4; ++k) {
+      elements[i * 4 + k] = planes[k * count + i];
+    }
+  }
+}
+
 // Memory that is written before it is read: not zeroed.
 class Scratch {
  public:

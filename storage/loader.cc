@@ -1,6 +1,9 @@
 #include "storage/loader.h"
 
+#include <algorithm>
+#include <atomic>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include "absl/strings/str_format.h"
@@ -8,24 +11,82 @@
 #include "storage/activity_codec.h"
 #include "storage/contact_codec.h"
 #include "storage/journal_codec.h"
+#include "storage/restore.h"
 #include "storage/schema.h"
 #include "storage/tile_codec.h"
 
 namespace fathom::storage {
 namespace {
 
+// Blobs that are read before they are decoded: bounds memory.
+constexpr std::size_t kTileChunkBytes = std::size_t{64} << 20;
+
+// Threads that decode tiles, at most: a start should be quick, not greedy.
+constexpr unsigned kMaxDecoders = 4;
+
+struct TileRow {
+  map::TileKey key;
+  Bytes blob;
+};
+
+absl::StatusOr<map::RestoredTile> RestoreRow(const TileRow& row,
+                                             const map::MissionOptions& map) {
+  FATHOM_ASSIGN_OR_RETURN(map::TileContent content,
+                          DecodeTile(row.key, row.blob));
+  return map::RestoredTile::Make(row.key, std::move(content),
+                                 map.global.root.max_level(),
+                                 static_cast<float>(map.global.tolerance_m));
+}
+
+// Decodes, checks and builds the tiles of `rows` on several threads, behind
+// `tiles` in the order of the rows. The error of the first bad row, if any.
+absl::Status RestoreRows(const std::vector<TileRow>& rows,
+                         const map::MissionOptions& map,
+                         std::vector<map::RestoredTile>& tiles) {
+  const std::size_t start = tiles.size();
+  tiles.resize(start + rows.size());
+  std::vector<absl::Status> failed(rows.size());
+  std::atomic<std::size_t> next{0};
+  const auto work = [&] {
+    for (std::size_t i = next++; i < rows.size(); i = next++) {
+      absl::StatusOr<map::RestoredTile> tile = RestoreRow(rows[i], map);
+      if (tile.ok()) {
+        tiles[start + i] = *std::move(tile);
+      } else {
+        failed[i] = tile.status();
+      }
+    }
+  };
+  const unsigned threads = std::clamp(std::thread::hardware_concurrency(), 1u,
+                                      rows.size() < 64 ? 1u : kMaxDecoders);
+  std::vector<std::thread> helpers;
+  for (unsigned i = 1; i < threads; ++i) helpers.emplace_back(work);
+  work();
+  for (std::thread& helper : helpers) helper.join();
+  for (const absl::Status& status : failed) FATHOM_RETURN_IF_ERROR(status);
+  return absl::OkStatus();
+}
+
 absl::Status LoadTiles(Connection& connection, Loaded& loaded) {
+  FATHOM_ASSIGN_OR_RETURN(const map::MissionOptions map,
+                          OptionsOf(loaded.metadata));
   FATHOM_ASSIGN_OR_RETURN(
       Statement select,
       connection.Prepare(
           "SELECT tile_key, content FROM tile ORDER BY tile_key"));
+  std::vector<TileRow> rows;
+  std::size_t bytes = 0;
   while (true) {
     FATHOM_ASSIGN_OR_RETURN(const bool more, select.Step());
-    if (!more) return absl::OkStatus();
-    const map::TileKey key = map::TileKey::FromPacked(select.ColumnUint(0));
-    FATHOM_ASSIGN_OR_RETURN(map::TileContent content,
-                            DecodeTile(key, select.ColumnBlob(1)));
-    loaded.tiles.emplace_back(key, std::move(content));
+    if (!more) return RestoreRows(rows, map, loaded.tiles);
+    const ByteSpan blob = select.ColumnBlob(1);
+    rows.push_back({.key = map::TileKey::FromPacked(select.ColumnUint(0)),
+                    .blob = Bytes(blob.begin(), blob.end())});
+    bytes += blob.size();
+    if (bytes < kTileChunkBytes) continue;
+    FATHOM_RETURN_IF_ERROR(RestoreRows(rows, map, loaded.tiles));
+    rows.clear();
+    bytes = 0;
   }
 }
 

@@ -11,6 +11,8 @@
 
 namespace fathom::storage {
 
+// Tiles are decoded, checked and built on up to four threads; all have ended
+// when it returns.
 // Errors: DATA_LOSS naming the row whose blob is damaged; those of sqlite.h.
 absl::StatusOr<Loaded> LoadMission(Connection& connection);
 

@@ -105,8 +105,9 @@ class MissionFile {
   absl::Status Commit(const Batch& batch);
 
   // Reads the whole mission. Before the first Commit. A blob whose checksum
-  // fails is DATA_LOSS naming the tile, block, contact or segment. Cost:
-  // about 20 ns per leaf.
+  // fails is DATA_LOSS naming the tile, block, contact or segment. Tiles are
+  // decoded on up to four threads, ended when it returns. Cost: about 30 ns
+  // of processor time per leaf.
   absl::StatusOr<Loaded> Load();
 
   // Copies the log into the file as far as no reader is in the way; for idle

@@ -154,7 +154,7 @@ struct LoadedActivity {
 // before fine, contacts by key, blocks by index.
 struct Loaded {
   MissionMetadata metadata;
-  std::vector<std::pair<map::TileKey, map::TileContent>> tiles;
+  std::vector<map::RestoredTile> tiles;
   std::vector<LoadedActivity> activities;
   std::vector<map::StoredContact> contacts;
   std::vector<SourcePosition> source_positions;

@@ -19,9 +19,8 @@ absl::Status Misfit(const absl::Status& status, const std::string& piece) {
 }
 
 absl::Status RestoreCheckpoint(Loaded& loaded, map::ObstacleMap& map) {
-  for (auto& [key, content] : loaded.tiles) {
-    FATHOM_RETURN_IF_ERROR(
-        Misfit(map.RestoreTile(key, std::move(content)), "a tile"));
+  for (map::RestoredTile& tile : loaded.tiles) {
+    FATHOM_RETURN_IF_ERROR(Misfit(map.RestoreTile(std::move(tile)), "a tile"));
   }
   for (LoadedActivity& activity : loaded.activities) {
     const map::ActivityId& id = activity.activity.start.id;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "absl/strings/str_format.h"
+#include "base/status_macros.h"
 #include "map/global/conglomerate.h"
 #include "map/global/work_tree.h"
 
@@ -51,12 +52,16 @@ GlobalMapView GlobalMap::View() {
 std::uint64_t GlobalMap::leaf_count() const { return tree_->leaf_count(); }
 
 absl::Status GlobalMap::RestoreTile(const TileKey& key, TileContent content) {
-  if (absl::Status status =
-          ValidateContent(key, content, options_.root.max_level());
-      !status.ok()) {
-    return status;
-  }
-  if (!restored_.emplace(key, std::move(content)).second) {
+  FATHOM_ASSIGN_OR_RETURN(
+      RestoredTile tile,
+      RestoredTile::Make(key, std::move(content), options_.root.max_level(),
+                         tree_->tolerance_m()));
+  return RestoreTile(std::move(tile));
+}
+
+absl::Status GlobalMap::RestoreTile(RestoredTile tile) {
+  const TileKey key = tile.key;
+  if (!restored_.emplace(key, std::move(tile)).second) {
     return absl::DataLossError(
         absl::StrFormat("tile level=%d row=%d col=%d is given twice", key.level,
                         key.row, key.col));
@@ -65,28 +70,22 @@ absl::Status GlobalMap::RestoreTile(const TileKey& key, TileContent content) {
 }
 
 absl::Status GlobalMap::FinishRestore() {
-  const std::map<TileKey, TileContent> restored = std::move(restored_);
+  std::map<TileKey, RestoredTile> restored = std::move(restored_);
   restored_.clear();
   if (restored.empty()) return absl::OkStatus();
   // Keys are ordered by level first: backwards is children before parents.
   std::map<TileKey, std::shared_ptr<const Tile>> built;
   for (auto it = restored.rbegin(); it != restored.rend(); ++it) {
     const TileKey& key = it->first;
-    const TileContent& content = it->second;
-    std::vector<Leaf> leaves(content.levels.size());
+    if (it->second.tile != nullptr) {
+      built.emplace(key, std::move(it->second.tile));
+      continue;
+    }
+    const TileContent& content = it->second.content;
     std::vector<std::shared_ptr<const Tile>> children;
     std::uint32_t position = 0;
-    for (std::size_t i = 0; i < leaves.size(); ++i) {
-      leaves[i] = {.depth_m = content.depths_m[i],
-                   .time_s = content.times_s[i],
-                   .std_code = content.std_codes[i],
-                   .residual_code = content.residual_codes.empty()
-                                        ? std::uint8_t{0}
-                                        : content.residual_codes[i],
-                   .spread_code = content.spread_codes.empty()
-                                      ? std::uint8_t{0}
-                                      : content.spread_codes[i]};
-      if (leaves[i].std_code == kChildCode) {
+    for (std::size_t i = 0; i < content.levels.size(); ++i) {
+      if (content.std_codes[i] == kChildCode) {
         const CellKey cell = CellInTile(key, position, content.levels[i]);
         const auto child = built.find(
             TileKey{.level = cell.level, .row = cell.row, .col = cell.col});
@@ -100,11 +99,8 @@ absl::Status GlobalMap::FinishRestore() {
       }
       position += SpanOf(content.levels[i]);
     }
-    for (std::size_t i = 0; i < content.hazard_slots.size(); ++i) {
-      leaves[content.hazard_slots[i]].hazard_m = content.hazards_m[i];
-    }
-    built.emplace(key, Tile::Build(key, content.levels, leaves,
-                                   std::move(children), tree_->tolerance_m()));
+    built.emplace(key, Tile::FromContent(key, content, std::move(children),
+                                         tree_->tolerance_m()));
   }
   const auto root = built.find(TileKey{});
   if (root == built.end()) {

@@ -10,7 +10,8 @@
 //      11-13) and the summary counts it.
 //   4. Every mean that Conglomerate() replaced lies within tolerance_m of the
 //      mean that replaced it, however often merging ran (rule kRange).
-//   5. Two surveys (MergeArea) of unknown ground with cells of one size give the
+//   5. Two surveys (MergeArea) of unknown ground with cells of one size give
+//   the
 //      same leaves in either order, bit for bit, as long as Conglomerate() has
 //      not joined one of them in between; over a chart they differ by code
 //      steps (map/global/fuse.h).
@@ -187,6 +188,8 @@ class GlobalMap {
   // Errors: DATA_LOSS: a bad key or content (see ValidateContent), or a key
   // given twice.
   absl::Status RestoreTile(const TileKey& key, TileContent content);
+  // The same for one made elsewhere, with this map's max_level and tolerance_m.
+  absl::Status RestoreTile(RestoredTile tile);
   // Errors: DATA_LOSS: a tile is missing or hangs on none. The map is then
   // empty. OK without any tile: an empty map.
   absl::Status FinishRestore();
@@ -198,7 +201,7 @@ class GlobalMap {
  private:
   GlobalMapOptions options_;
   std::unique_ptr<WorkTree> tree_;
-  std::map<TileKey, TileContent> restored_;
+  std::map<TileKey, RestoredTile> restored_;
 };
 
 }  // namespace fathom::map

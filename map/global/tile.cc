@@ -117,28 +117,35 @@ std::shared_ptr<const Tile> Tile::Build(
   bool residuals = false;
   bool spreads = false;
   std::size_t hazards = 0;
+  // Times of known leaves: of the first, and of all that are not 0.
+  std::uint32_t first_s = 0;
+  bool any_known = false;
+  bool times_differ = false;
   std::uint32_t earliest_s = 0;
   std::uint32_t latest_s = 0;
+  TileTotals totals;
   for (const Leaf& leaf : leaves) {
+    if (leaf.std_code == kChildCode) continue;
+    ++totals.leaves;
     if (!leaf.known()) continue;
+    ++totals.known_leaves;
     residuals = residuals || leaf.residual_code != 0;
     spreads = spreads || leaf.spread_code != 0;
     hazards += leaf.has_hazard() ? 1 : 0;
+    const float residual_m = DecodeResidualM(leaf.residual_code, tolerance_m);
+    totals.shoalest_m = std::min(
+        totals.shoalest_m, std::min(leaf.depth_m - residual_m, leaf.hazard_m));
+    totals.deepest_m = std::max(totals.deepest_m, leaf.depth_m + residual_m);
+    if (!any_known) first_s = leaf.time_s;
+    any_known = true;
+    times_differ = times_differ || leaf.time_s != first_s;
     if (leaf.time_s == 0) continue;
     if (earliest_s == 0 || leaf.time_s < earliest_s) earliest_s = leaf.time_s;
     latest_s = std::max(latest_s, leaf.time_s);
   }
   // Charts and quick surveys: one time for all.
-  const auto first_known =
-      std::find_if(leaves.begin(), leaves.end(),
-                   [](const Leaf& leaf) { return leaf.known(); });
-  const std::uint32_t time_s =
-      first_known == leaves.end() ? 0 : first_known->time_s;
-  const bool one_time =
-      children.empty() &&
-      std::all_of(leaves.begin(), leaves.end(), [time_s](const Leaf& leaf) {
-        return !leaf.known() || leaf.time_s == time_s;
-      });
+  const std::uint32_t time_s = first_s;
+  const bool one_time = children.empty() && !times_differ;
   const bool short_time = !one_time && latest_s - earliest_s < kShortTimeMask;
   const std::size_t record_bytes = one_time     ? kTimelessBytes
                                    : short_time ? kShortTimeBytes
@@ -211,29 +218,19 @@ std::shared_ptr<const Tile> Tile::Build(
     to = depth;
   }
   *to = std::byte{0};
-  tile->AddTotals(tolerance_m);
+  tile->totals_ = totals;
+  tile->AddChildren();
   return tile;
 }
 
 Tile::~Tile() { std::destroy_n(const_cast<Child*>(Children()), child_count_); }
 
-void Tile::AddTotals(float tolerance_m) {
+void Tile::AddChildren() {
   TileTotals& totals = totals_;
   totals.tiles = 1;
   // The tile and the reference count, each an allocation.
-  totals.memory_bytes = blocks_at_ + ByteCount() + kAllocationBytes +
+  totals.memory_bytes = blocks_at_ + ByteCount() + 1 + kAllocationBytes +
                         kControlBytes + kAllocationBytes;
-  for (std::uint32_t slot = 0; slot < slot_count_; ++slot) {
-    if (IsChild(slot)) continue;
-    const Leaf leaf = LeafAt(slot);
-    ++totals.leaves;
-    if (!leaf.known()) continue;
-    ++totals.known_leaves;
-    const float residual_m = DecodeResidualM(leaf.residual_code, tolerance_m);
-    totals.shoalest_m = std::min(totals.shoalest_m, leaf.depth_m - residual_m);
-    totals.deepest_m = std::max(totals.deepest_m, leaf.depth_m + residual_m);
-    totals.shoalest_m = std::min(totals.shoalest_m, leaf.hazard_m);
-  }
   for (const std::shared_ptr<const Tile>& child : this->children()) {
     const TileTotals& below = child->totals();
     totals.tiles += below.tiles;
@@ -387,6 +384,27 @@ bool Tile::SameSlots(const Tile& other) const {
          std::memcmp(Block(0), other.Block(0), ByteCount()) == 0;
 }
 
+std::shared_ptr<const Tile> Tile::FromContent(
+    const TileKey& key, const TileContent& content,
+    std::vector<std::shared_ptr<const Tile>> children, float tolerance_m) {
+  std::vector<Leaf> leaves(content.levels.size());
+  for (std::size_t i = 0; i < leaves.size(); ++i) {
+    leaves[i].depth_m = content.depths_m[i];
+    leaves[i].time_s = content.times_s[i];
+    leaves[i].std_code = content.std_codes[i];
+  }
+  for (std::size_t i = 0; i < content.residual_codes.size(); ++i) {
+    leaves[i].residual_code = content.residual_codes[i];
+  }
+  for (std::size_t i = 0; i < content.spread_codes.size(); ++i) {
+    leaves[i].spread_code = content.spread_codes[i];
+  }
+  for (std::size_t i = 0; i < content.hazard_slots.size(); ++i) {
+    leaves[content.hazard_slots[i]].hazard_m = content.hazards_m[i];
+  }
+  return Build(key, content.levels, leaves, std::move(children), tolerance_m);
+}
+
 TileContent Tile::Content() const {
   TileContent content;
   content.levels.reserve(slot_count_);
@@ -483,6 +501,26 @@ absl::Status ValidateContent(const TileKey& key, const TileContent& content,
     }
   }
   return absl::OkStatus();
+}
+
+absl::StatusOr<RestoredTile> RestoredTile::Make(const TileKey& key,
+                                                TileContent content,
+                                                int max_level,
+                                                float tolerance_m) {
+  if (absl::Status status = ValidateContent(key, content, max_level);
+      !status.ok()) {
+    return status;
+  }
+  RestoredTile restored{.key = key};
+  const bool has_children =
+      std::find(content.std_codes.begin(), content.std_codes.end(),
+                kChildCode) != content.std_codes.end();
+  if (has_children) {
+    restored.content = std::move(content);
+  } else {
+    restored.tile = Tile::FromContent(key, content, {}, tolerance_m);
+  }
+  return restored;
 }
 
 }  // namespace fathom::map

@@ -242,6 +242,10 @@ absl::Status ObstacleMap::RestoreTile(TileKey key, TileContent content) {
   return global_.RestoreTile(key, std::move(content));
 }
 
+absl::Status ObstacleMap::RestoreTile(RestoredTile tile) {
+  return global_.RestoreTile(std::move(tile));
+}
+
 absl::Status ObstacleMap::RestoreActivity(const StoredActivity& stored) {
   FATHOM_ASSIGN_OR_RETURN(LocalMap local,
                           LocalMap::Create(stored.start.options));

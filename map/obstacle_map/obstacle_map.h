@@ -128,6 +128,7 @@ class ObstacleMap {
 
   // ---- Restoring a stored map; before any other change. ----
   absl::Status RestoreTile(TileKey key, TileContent content);
+  absl::Status RestoreTile(RestoredTile tile);
   absl::Status RestoreActivity(const StoredActivity& stored);
   absl::Status RestoreBlock(const ActivityId& id, BlockIndex index,
                             const LocalBlock& block);
