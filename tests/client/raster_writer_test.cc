@@ -13,6 +13,7 @@
 
 #include "client/cli/exit_code.h"
 #include "client/cli/raster.h"
+#include "client/cli/raster_sampling.h"
 #include "tests/testing/status_matchers.h"
 
 namespace fathom::client::cli {
@@ -194,6 +195,33 @@ TEST_F(RasterWriterTest, BagSaysOneSigmaDatumAndNodata) {
   // Elevations: up.
   EXPECT_EQ(ReadBand(path, 1)[0], -12.25f);
   EXPECT_EQ(ReadBand(path, 1)[1], 1e6f);
+}
+
+TEST_F(RasterWriterTest, DepthsAtAreThoseOfTheCellsThatHoldTheMiddles) {
+  const std::string path = folder_ / "map.tif";
+  FATHOM_ASSERT_OK(WriteRaster({.region = region_}, {.path = path}));
+  FATHOM_ASSERT_OK_AND_ASSIGN(
+      const auto raster, DepthRaster::Open({.path = path, .land_above_m = 2}));
+  FATHOM_ASSERT_OK_AND_ASSIGN(const std::vector<float> same,
+                              DepthsAt(*raster, region_));
+  EXPECT_THAT(same, SameFloats(region_.depth_m));
+  // Two cells of twice the size, half a cell north-west of the grid: middles
+  // at 41.4995 N, 71.4995 W (cell 0) and 71.4975 W (cell 2, land).
+  Region coarse;
+  coarse.rows = 1;
+  coarse.columns = 2;
+  coarse.north_west.set_latitude_deg(41.5005);
+  coarse.north_west.set_longitude_deg(-71.5005);
+  coarse.latitude_step_deg = coarse.longitude_step_deg = 0.002;
+  coarse.depth_m.assign(2, 0);
+  FATHOM_ASSERT_OK_AND_ASSIGN(const std::vector<float> there,
+                              DepthsAt(*raster, coarse));
+  EXPECT_THAT(there, SameFloats(std::vector<float>{12.25f, kNan}));
+  // Elsewhere.
+  coarse.north_west.set_longitude_deg(100);
+  FATHOM_ASSERT_OK_AND_ASSIGN(const std::vector<float> elsewhere,
+                              DepthsAt(*raster, coarse));
+  EXPECT_THAT(elsewhere, SameFloats(std::vector<float>{kNan, kNan}));
 }
 
 TEST_F(RasterWriterTest, UtmKeepsValuesOfNearestCells) {

@@ -116,6 +116,38 @@ class Export(LiveTest):
             self.assertEqual(checked["cells_unknown"],
                              first["cells_unknown"])
 
+    def test_a_map_does_not_differ_from_its_own_export(self):
+        self.load()
+        area = ("--area", self.AREA, "--resolution-m", 40)
+        out = self.folder / "map.tif"
+        told = json.loads(self.fathom("--json", "export", *area, "-o",
+                                      out).stdout)
+        picture = self.folder / "difference.png"
+        drawn = json.loads(self.fathom(
+            "--json", "render", *area, "--show", "depth,age,layer",
+            "--against", out, "-o", picture).stdout)
+        self.assertEqual(drawn["difference"]["cells"], told["cells_known"])
+        self.assertEqual(drawn["difference"]["most_m"], 0)
+        self.assertGreater(picture.stat().st_size, 10_000)
+        # A mission whose chart is 1 m deeper everywhere.
+        with self.new_mission("--tolerance-m", "0.05", "--min-cell-m", "5",
+                              name="other.fathom") as other:
+            lines = self.chart.read_text().splitlines()
+            deeper = lines[:6] + [
+                " ".join(str(float(v) - 1) if v != "-9999.0000" else v
+                         for v in line.split()) for line in lines[6:]]
+            chart = self.folder / "deeper.asc"
+            chart.write_text("\n".join(deeper) + "\n")
+            done = run(FATHOM, "prior", "import", chart, "--crs", "EPSG:4326",
+                       "--positive", "up", "--std-m", 2, server=other)
+            self.assertEqual(done.returncode, OK, done.stderr)
+            drawn = json.loads(self.fathom(
+                "--json", "render", *area, "--against-server", other.address,
+                "-o", picture).stdout)
+        # Conglomerated within 0.05 m each.
+        self.assertAlmostEqual(drawn["difference"]["mean_m"], -1, delta=0.1)
+        self.assertLessEqual(drawn["difference"]["most_m"], 1.1)
+
     def test_errors_say_what_to_do(self):
         out = self.folder / "map.tif"
         # Nothing is known yet.
