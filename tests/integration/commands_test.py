@@ -77,7 +77,10 @@ class Commands(LiveTest):
     def test_prior(self):
         arguments = ("prior", "import", self.chart, "--crs", "EPSG:4326",
                      "--positive", "up", "--std-m", 4)
+        # The mission holds this chart already.
         document = json.loads(self.fathom(*arguments, "--json"))
+        self.assertTrue(document["already_loaded"])
+        document = json.loads(self.fathom(*arguments, "--again", "--json"))
         self.assertEqual(document["chart"]["cells_with_depth"], 380)
         self.assertEqual(int(document["import"]["cells_land"]), 20)
         # A dry run needs no server.
