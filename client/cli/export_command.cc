@@ -92,7 +92,14 @@ absl::StatusOr<double> ChooseResolution(
   }
   const double finest_m = std::max(
       0.1, area.cell_m > 0 ? area.cell_m : status.global_map().min_cell_m());
-  return fitting(finest_m);
+  const double resolution_m = fitting(finest_m);
+  if (resolution_m > finest_m) {
+    Note(absl::StrFormat(
+        "cells of %g m: as fine as one answer holds; the map's own are %g m (a "
+        "smaller area shows them; the band shoalest keeps what lies between)",
+        resolution_m, finest_m));
+  }
+  return resolution_m;
 }
 
 struct Counts {
