@@ -1,11 +1,14 @@
 #include "client/cli/raster_writer.h"
 
+#include <cpl_vsi.h>
 #include <gdal_utils.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cmath>
 #include <exception>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 #include <system_error>
 #include <utility>
@@ -353,16 +356,32 @@ class Writer {
         creation.Add("TILED=YES");
       }
     }
+    // HDF5 does not survive a disk that is full: a BAG is built in memory.
+    const std::string target = bag_ ? "/vsimem/fathom_export.bag" : path;
     const GdalErrors errors;
     {
       const DatasetPtr copy(driver.CreateCopy(
-          path.c_str(), &dataset, FALSE, creation.get(), &Progress,
+          target.c_str(), &dataset, FALSE, creation.get(), &Progress,
           const_cast<std::function<void(double)>*>(&options_.progress)));
       if (copy == nullptr) return NotWritable(errors.message());
     }
     // Closing flushes; that fails on a full disk.
     if (errors.failed()) return NotWritable(errors.message());
-    return absl::OkStatus();
+    return bag_ ? MoveFromMemory(target, path) : absl::OkStatus();
+  }
+
+  absl::Status MoveFromMemory(const std::string& from,
+                              const std::string& to) const {
+    vsi_l_offset bytes = 0;
+    GByte* const content = VSIGetMemFileBuffer(from.c_str(), &bytes, TRUE);
+    std::ofstream out(to, std::ios::binary | std::ios::trunc);
+    out.write(reinterpret_cast<const char*>(content),
+              static_cast<std::streamsize>(bytes));
+    out.close();
+    const bool written = content != nullptr && out.good();
+    CPLFree(content);
+    if (written) return absl::OkStatus();
+    return NotWritable(std::generic_category().message(errno));
   }
 
   absl::Status ReadBack(const std::string& path, GDALDataset& written,

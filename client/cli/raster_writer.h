@@ -16,6 +16,8 @@
 // renamed, so that a reader never sees half a file and an error leaves what
 // was there.
 //
+// Memory: the region once more (bands are filled in memory), a BAG also itself.
+//
 // Thread safety: one thread at a time.
 
 #ifndef FATHOM_CLIENT_CLI_RASTER_WRITER_H_

@@ -6,8 +6,10 @@
 #include <gdal_priv.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <cmath>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 
@@ -271,6 +273,39 @@ TEST_F(RasterWriterTest, WhatCannotBeWrittenLeavesWhatWasThere) {
                              ExportBand::kAge}}),
       StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("cog")));
   EXPECT_THAT(Files(), ElementsAre("map.tif"));
+}
+
+TEST_F(RasterWriterTest, FullDiskIsAnErrorThatLeavesNothingBehind) {
+  // A limit on the size of files stands in for the disk: 40 kB for 300 x 300
+  // cells of noise, which no format makes smaller than that.
+  Region large;
+  large.rows = large.columns = 300;
+  large.north_west = region_.north_west;
+  large.latitude_step_deg = large.longitude_step_deg = 1e-4;
+  std::uint32_t random = 1;
+  for (int i = 0; i < 90'000; ++i) {
+    random = random * 1'664'525 + 1'013'904'223;  // Numerical Recipes.
+    large.depth_m.push_back(static_cast<float>(random) * 1e-8f);
+    large.std_m.push_back(static_cast<float>(random % 1000) + 1);
+    large.kind.push_back(v1::EVIDENCE_KIND_MEASURED);
+  }
+  large.age_s = large.shoalest_m = large.std_m;
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit small{40'000, before.rlim_max};
+  for (const ExportFormat format :
+       {ExportFormat::kCog, ExportFormat::kTif, ExportFormat::kBag}) {
+    setrlimit(RLIMIT_FSIZE, &small);
+    const absl::Status status =
+        WriteRaster({.region = large},
+                    {.path = folder_ / "map", .format = format})
+            .status();
+    setrlimit(RLIMIT_FSIZE, &before);
+    EXPECT_EQ(ExitCodeOf(status), ExitCode::kBadFile) << status;
+  }
+  std::signal(SIGXFSZ, handler);
+  EXPECT_THAT(Files(), ::testing::IsEmpty());
 }
 
 }  // namespace
