@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -306,6 +307,59 @@ TEST_F(Conglomerate, Figure418DriftsBeyondItsTolerance) {
   // two such levels more and it is a metre. The code is at its end.
   EXPECT_NEAR(at->second.depth_m, 10.25, 1e-5);
   EXPECT_EQ(at->second.residual_code, 255);
+}
+
+TEST(ConglomerateAreas, LeavesWhatIsKeptAsItWasUntilItIsFree) {
+  const RootSquare root = SquareOf(640, 10.1);
+  GlobalMap map({.root = root});
+  map.MergeArea(root.Corners({}), 10.1,
+                [](const GeodeticPoint&) { return Measured(10, 0.25f); });
+  ASSERT_EQ(map.leaf_count(), 4096u);
+  // The cells of level 1: the north-western quarter is kept.
+  const CellKey quarter{.level = 1, .row = 0, .col = 0};
+  std::array<GeodeticPoint, 4> inner = root.Corners(quarter);
+  const GeodeticPoint middle = root.Center(quarter);
+  for (GeodeticPoint& corner : inner) {
+    // A tenth towards the middle: no rounding reaches the neighbours.
+    corner.latitude_deg += 0.1 * (middle.latitude_deg - corner.latitude_deg);
+    corner.longitude_deg += 0.1 * (middle.longitude_deg - corner.longitude_deg);
+  }
+  const std::array<LatticeBox, 1> kept{root.BoxAround(inner).value()};
+  map.Conglomerate(MergeRule::kRange, kept);
+  // Three quarters became one leaf each; of the kept one only the rim outside
+  // the box may have joined: 0.9 x 0.9 of its 1024 cells are inside, 829.
+  const auto at = map.View().LeafAt(middle);
+  EXPECT_EQ(at->first.level, 6);
+  EXPECT_EQ(map.View().LeafAt(root.Center({1, 1, 1}))->first.level, 1);
+  EXPECT_GT(map.leaf_count(), 3u + 829u);
+  // Again: nothing is free yet.
+  const auto before = LeavesOf(map.View());
+  map.Conglomerate(MergeRule::kRange, kept);
+  EXPECT_EQ(LeavesOf(map.View()), before);
+  // Free: all becomes one.
+  map.Conglomerate();
+  EXPECT_EQ(map.leaf_count(), 1u);
+}
+
+TEST(ConglomerateAreas, AHazardStaysAsSmallAsItWasFound) {
+  const RootSquare root = SquareOf(640, 10.1);
+  GlobalMap map({.root = root});
+  const GeodeticPoint rock = root.Center({.level = 6, .row = 20, .col = 30});
+  map.MergeArea(root.Corners({}), 10.1, [&](const GeodeticPoint& p) {
+    DepthEstimate estimate = Measured(10, 0.25f);
+    if (DistanceM(p, rock) < 3) estimate.hazard_m = 2.0f;
+    return estimate;
+  });
+  map.Conglomerate();
+  EXPECT_EQ(map.View().LeafAt(rock)->first.level, 6);
+  EXPECT_EQ(map.View().At(rock)->hazard_m, 2.0f);
+  int hazards = 0;
+  map.View().ForEachLeaf([&](const CellKey&, const Leaf& leaf) {
+    hazards += leaf.has_hazard() ? 1 : 0;
+  });
+  EXPECT_EQ(hazards, 1);
+  // Three leaves at each of six levels, and its own.
+  EXPECT_EQ(map.leaf_count(), 3u * 6u + 1u);
 }
 
 }  // namespace

@@ -91,6 +91,46 @@ TEST_F(MergeArea, PriorCountsOnceAndManyTransfersEqualTheBatch) {
   EXPECT_EQ(estimate->kind, EvidenceKind::kMeasured);
 }
 
+TEST_F(MergeArea, VariabilityDoesNotShrinkWithMoreEvidence) {
+  // Predictive 0.5 of which 0.4 is variability: the mean is known to 0.3. Nine
+  // such surveys know it to 0.1, and the cell still varies by 0.4.
+  for (int i = 0; i < 9; ++i) {
+    map_.MergeArea(root_.Corners(cell_), 10.1, [](const GeodeticPoint&) {
+      DepthEstimate estimate = Measured(12, 0.5f);
+      estimate.variability_m = 0.4f;
+      return estimate;
+    });
+  }
+  const auto estimate = At(cell_);
+  // A spread code is right to 0.9 %, and was rounded nine times.
+  EXPECT_NEAR(estimate->std_m, std::sqrt(0.01 + 0.16), 0.025 * 0.412);
+  EXPECT_NEAR(estimate->variability_m, 0.4, 0.025 * 0.4);
+}
+
+TEST_F(MergeArea, TheShoalestHazardStaysAndASeabedIsNone) {
+  const auto survey = [this](float depth_m, float hazard_m) {
+    map_.MergeArea(root_.Corners(cell_), 10.1, [=](const GeodeticPoint&) {
+      DepthEstimate estimate = Measured(depth_m, 0.5f);
+      estimate.hazard_m = hazard_m;
+      return estimate;
+    });
+  };
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+  survey(12, kNone);
+  EXPECT_TRUE(std::isnan(At(cell_)->hazard_m));
+  survey(12, 12.5f);  // Below the seabed.
+  EXPECT_TRUE(std::isnan(At(cell_)->hazard_m));
+  survey(12, 6.3f);
+  EXPECT_EQ(At(cell_)->hazard_m, 6.3f);
+  survey(12, 4.1f);
+  survey(12, 8.0f);
+  survey(12, kNone);
+  EXPECT_EQ(At(cell_)->hazard_m, 4.1f);
+  EXPECT_NEAR(At(cell_)->depth_m, 12, 1e-5);
+  EXPECT_EQ(map_.View().Bounds({})->shoalest_m, 4.1f);
+  EXPECT_EQ(map_.View().Bounds(cell_)->shoalest_m, 4.1f);
+}
+
 TEST_F(MergeArea, ChildrenInheritTheValueOfADividedLeaf) {
   const GeodeticPoint corner = Direct(kNarragansett, 315, 600);
   ASSERT_TRUE(
