@@ -168,6 +168,10 @@ std::shared_ptr<const Tile> Tile::Build(
   tile->records_at_ = static_cast<std::uint32_t>(
       tile->blocks_at_ + (block_count + 1) * kBlockBytes);
 
+  if (!children.empty()) {
+    tile->child_shift_ = static_cast<std::uint8_t>(kMaxLevel - kTileLevels -
+                                                   children[0]->key().level);
+  }
   std::byte* to = reinterpret_cast<std::byte*>(tile.get() + 1);
   for (Child& child : children) {
     new (to) Child(std::move(child));
@@ -321,8 +325,8 @@ inline void Tile::LoadRest(std::uint32_t slot, Leaf& leaf) const {
 Tile::Found Tile::Descend(const Tile& root, std::uint32_t row,
                           std::uint32_t col) {
   const Tile* tile = &root;
+  int shift = kMaxLevel - kTileLevels;
   for (;;) {
-    const int shift = kMaxLevel - kTileLevels - tile->key_.level;
     const std::uint32_t position =
         (std::uint32_t{kSpread[(row >> shift) & (kTileSide - 1)]} << 1) |
         kSpread[(col >> shift) & (kTileSide - 1)];
@@ -340,6 +344,7 @@ Tile::Found Tile::Descend(const Tile& root, std::uint32_t row,
       found.level = tile->key_.level + rank.Level();
       return found;
     }
+    shift = tile->child_shift_;
     tile = tile->Children()[tile->ChildIndex(record)].get();
   }
 }

@@ -240,6 +240,9 @@ class Tile {
   bool has_residuals_ = false;
   bool has_spreads_ = false;
   mutable bool settled_ = false;
+  // Where in a lattice index the position within a child begins: known before
+  // the child is read, so that Descend does not wait for it (15 ns).
+  std::uint8_t child_shift_ = 0;
   std::uint16_t hazard_count_ = 0;
   // Of all known leaves, if the records hold none; the earliest that is known,
   // if they hold 3 bytes.
