@@ -163,6 +163,22 @@ TEST(ConvertHeader, NamesEveryBadField) {
   EXPECT_THAT(Header(header), StatusIs(absl::StatusCode::kResourceExhausted));
 }
 
+TEST(ConvertHeader, AnImportIsNamedAndResumedByName) {
+  v1::PriorHeader header;
+  header.set_name("chart");
+  FATHOM_ASSERT_OK_AND_ASSIGN(const ChartHeader plain, Header(header));
+  EXPECT_EQ(plain.import_id, "");
+  EXPECT_EQ(plain.first_tile, 1U);
+  header.set_first_tile(5);
+  EXPECT_THAT(Header(header), Violates("header.first_tile"));
+  header.set_import_id("sha256-0a1b2c");
+  FATHOM_ASSERT_OK_AND_ASSIGN(const ChartHeader resumed, Header(header));
+  EXPECT_EQ(resumed.import_id, "sha256-0a1b2c");
+  EXPECT_EQ(resumed.first_tile, 5U);
+  header.set_import_id("two words");
+  EXPECT_THAT(Header(header), Violates("header.import_id"));
+}
+
 absl::StatusOr<map::RasterBlock> Tile(const v1::DepthTile& tile) {
   const FieldPath root;
   return ConvertTile(tile, {.name = "c", .time_s = 7, .replace = true},
