@@ -12,6 +12,7 @@
 #include "server/errors.h"
 #include "server/field_checks.h"
 #include "server/limits.h"
+#include "server/source_ledger.h"
 
 namespace fathom::server {
 namespace {
@@ -418,6 +419,16 @@ void WriteLimits(v1::Limits* out) {
   out->set_max_ingest_streams(kMaxIngestStreams);
   out->set_max_watchers(kMaxWatchers);
   out->set_max_pending_ingest(kMaxPendingIngest);
+  out->set_max_local_side_cells(map::kMaxLocalSideCells);
+  out->set_max_smoothing_cells(map::kMaxSmoothReach);
+  out->set_max_activities(map::MissionOptions{}.max_activities);
+  out->set_max_import_cells(kMaxImportCells);
+  out->set_max_imports(kMaxImports);
+  out->set_max_history_estimates(kMaxHistoryEstimates);
+  out->set_max_bulk_streams(kMaxBulkStreams);
+  out->set_max_revision_waiters(kMaxRevisionWaiters);
+  out->set_max_pending_commands(kMaxPendingCommands);
+  out->set_max_sources(SourceLedger::kMaxSources);
 }
 
 }  // namespace fathom::server

@@ -119,7 +119,8 @@ absl::Status CheckPoints(const v1::QueryObstaclesRequest& request,
   return absl::OkStatus();
 }
 
-void WriteReasons(const map::ObstacleAnswer& answer, int index,
+// The answer to the point `index` of `count`.
+void WriteReasons(const map::ObstacleAnswer& answer, int index, int count,
                   v1::QueryObstaclesResponse* out) {
   const map::SeabedReason* seabed =
       answer.seabed.has_value() ? &*answer.seabed : nullptr;
@@ -133,6 +134,13 @@ void WriteReasons(const map::ObstacleAnswer& answer, int index,
   out->mutable_kind()->AddAlreadyReserved(
       seabed == nullptr ? static_cast<int>(v1::EVIDENCE_KIND_UNSPECIFIED)
                         : static_cast<int>(seabed->estimate.kind));
+  if (seabed != nullptr && !std::isnan(seabed->estimate.hazard_m)) {
+    // Rare: the array is made when the first hazard is met.
+    if (out->hazard_m().empty()) {
+      out->mutable_hazard_m()->Resize(count, kNaN);
+    }
+    out->set_hazard_m(index, seabed->estimate.hazard_m);
+  }
   for (const map::ContactReason& reason : answer.contacts) {
     v1::PointContact* contact = out->add_contacts();
     contact->set_point_index(static_cast<uint32_t>(index));
@@ -176,6 +184,9 @@ void WriteAnswer(const map::ObstacleAnswer& answer, v1::ObstacleAnswer* out) {
     seabed->set_cell_size_m(reason.estimate.cell_size_m);
     if (!std::isnan(reason.estimate.shoalest_m)) {
       seabed->set_shoalest_m(reason.estimate.shoalest_m);
+    }
+    if (!std::isnan(reason.estimate.hazard_m)) {
+      seabed->set_hazard_m(reason.estimate.hazard_m);
     }
     if (reason.activity != nullptr) {
       seabed->set_activity_id(reason.activity->value);
@@ -224,7 +235,7 @@ absl::Status AnswerBatch(const v1::QueryObstaclesRequest& request, Time now,
     out->mutable_probability()->AddAlreadyReserved(
         static_cast<float>(answer.probability));
     out->mutable_state()->AddAlreadyReserved(static_cast<int>(answer.state));
-    if (request.with_reasons()) WriteReasons(answer, i, out);
+    if (request.with_reasons()) WriteReasons(answer, i, count, out);
   }
   WriteStamp(view, out->mutable_stamp());
   return absl::OkStatus();

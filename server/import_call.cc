@@ -100,6 +100,7 @@ void ImportCall::Import(map::RasterBlock block, bool last) {
                                   result.cells_unknown);
       response->set_cells_outside(response->cells_outside() +
                                   result.cells_outside);
+      response->set_degraded(response->degraded() + result.degraded);
       if (!last) {
         call->StartRead(&call->request_);
         return;

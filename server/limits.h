@@ -50,7 +50,7 @@ inline constexpr uint64_t kImportCheckpointCells = 4'000'000;
 // Most cells in a GetRegion answer: 4096 x 4096, 270 MB on the wire.
 inline constexpr uint64_t kMaxRegionCells = 16'777'216;
 
-// Side of a GetRegion tile: 256 x 256 x 17 B = 1.1 MB, below the 4 MB that
+// Side of a GetRegion tile: 256 x 256 x 22 B = 1.4 MB, below the 4 MB that
 // foreign gRPC clients accept by default.
 inline constexpr uint32_t kRegionTileSide = 256;
 
@@ -99,8 +99,10 @@ inline constexpr double kMaxSonarRangeM = 100'000;
 inline constexpr double kDefaultMaxRangeM = 1000;
 // Smoothing reaches at most so far; cells within d are touched per beam.
 inline constexpr double kMaxSmoothingDistanceM = 1000;
-// Finest answer cell of GetRegion.
+// Finest and coarsest answer cell of GetRegion: past 100 km the arcs between
+// a cell's corners bow too far to be bounded closely.
 inline constexpr double kMinResolutionM = 0.1;
+inline constexpr double kMaxResolutionM = 100'000;
 // Step of a chart's grid, degrees.
 inline constexpr double kMaxStepDeg = 10;
 // How far before and behind the base time a point of a batch may lie: 10
@@ -133,6 +135,12 @@ inline constexpr std::chrono::microseconds kCommitInterval{2000};
 inline constexpr int kMaxIngestStreams = 64;
 // Concurrent imports.
 inline constexpr int kMaxImports = 4;
+// Concurrent GetRegion and GetContactHistory streams: each holds at most
+// 1.5 MB of a region or 30 MB of a history for its reader.
+inline constexpr size_t kMaxBulkStreams = 64;
+// Threads for them and for digests: one on a vehicle's second core, two
+// ashore; gRPC's own stay free for short calls.
+inline constexpr size_t kWorkerThreads = 2;
 // Concurrent watchers (issue of the watch RPCs).
 inline constexpr int kMaxWatchers = 256;
 // Queries that wait for a min_revision.

@@ -27,14 +27,17 @@ storage::SourcePosition PositionOf(const IngestMessage& message) {
 }
 
 // Tells what the map's own refusal means.
-std::string Describe(map::RejectReason reason) {
+std::string Describe(map::RejectReason reason, size_t max_contacts) {
   switch (reason) {
     case map::RejectReason::kGated:
       return "too far from where the contact can be";
     case map::RejectReason::kTooLate:
       return "older than the newest report about this contact";
     case map::RejectReason::kContactsFull:
-      return "the contact list is full; drop contacts that are gone";
+      return absl::StrFormat(
+          "the contact list is full: max_contacts=%d are live; drop contacts "
+          "that are gone",
+          max_contacts);
     default:
       return absl::StrFormat("refused: %s", map::RejectReasonName(reason));
   }
@@ -80,11 +83,6 @@ absl::Status MapKeeper::Stop() {
 std::shared_ptr<const map::ObstacleMapView> MapKeeper::View() const {
   MutexLock lock(view_mutex_);
   return view_;
-}
-
-map::RejectCounts MapKeeper::contact_rejects() const {
-  MutexLock lock(view_mutex_);
-  return contact_rejects_;
 }
 
 StorageState MapKeeper::storage_state() const {
@@ -428,7 +426,8 @@ void MapKeeper::ApplyContact(IngestMessage& message, MessageOutcome& outcome,
     const auto reason =
         result.reason.value_or(map::RejectReason::kInvalidMessage);
     outcome.fate = MessageFate::kRefused;
-    outcome.refusal = {reason, "", Describe(reason)};
+    outcome.refusal = {reason, "",
+                       Describe(reason, map_->options().contacts.max_contacts)};
     // A refusal that the map counts is replayed like any other event.
     if (map_->revision() == revision_before) return;
   } else {
@@ -447,7 +446,6 @@ MapKeeper::ViewPtr MapKeeper::Publish() {
   {
     MutexLock lock(view_mutex_);
     view_.swap(replaced);
-    contact_rejects_ = map_->contact_rejects();
   }
   gate_.Reach(view->revision());
   // `replaced` may be the last reference to old pieces: freed here, outside

@@ -144,8 +144,6 @@ class MapKeeper {
   }
 
   StorageState storage_state() const;
-  // Contact reports refused since the mission was opened, by reason.
-  map::RejectCounts contact_rejects() const;
 
   // ---- Ingest ----
 
@@ -296,7 +294,6 @@ class MapKeeper {
 
   mutable Mutex view_mutex_;
   ViewPtr view_ FATHOM_GUARDED_BY(view_mutex_);
-  map::RejectCounts contact_rejects_ FATHOM_GUARDED_BY(view_mutex_);
 
   mutable Mutex mutex_;
   CondVar queue_changed_;

@@ -140,7 +140,6 @@ grpc::ServerUnaryReactor* MissionService::GetMissionStatus(
   response->set_server_version(FATHOM_VERSION);
   WriteStamp(*view, response->mutable_stamp());
   response->set_uptime_s(SecondsSince(context_.start));
-  if (request->with_digest()) response->set_map_digest(view->Digest());
   WriteActivities(*view, response->mutable_activities());
 
   v1::GlobalMapStatus* global = response->mutable_global_map();
@@ -152,6 +151,7 @@ grpc::ServerUnaryReactor* MissionService::GetMissionStatus(
   global->set_min_cell_m(root.cell_size_m(root.max_level()));
   global->set_leaves(map.known_leaf_count());
   global->set_max_cells(metadata.max_cells);
+  global->set_degraded(view->counters().degraded);
   global->set_memory_bytes(map.memory_bytes());
   global->set_tolerance_m(metadata.tolerance_m);
 
@@ -160,7 +160,7 @@ grpc::ServerUnaryReactor* MissionService::GetMissionStatus(
   contacts->set_dropped(view->contacts().size() -
                         view->contacts().live_count());
   contacts->set_max_contacts(metadata.max_contacts);
-  WriteRejects(context_.keeper.contact_rejects(), contacts->mutable_rejects());
+  WriteRejects(view->counters().contact_rejects, contacts->mutable_rejects());
   WriteContactClasses(view->contacts().classes(), contacts);
 
   v1::StorageStatus* storage = response->mutable_storage();
@@ -172,7 +172,14 @@ grpc::ServerUnaryReactor* MissionService::GetMissionStatus(
   storage->set_durable_revision(state.durable_revision);
   storage->set_fault(state.fault);
   WriteLimits(response->mutable_limits());
-  return Reply(call, absl::OkStatus());
+  if (!request->with_digest()) return Reply(call, absl::OkStatus());
+  // Reads the whole map: not on a thread that other calls need.
+  grpc::ServerUnaryReactor* reactor = call->DefaultReactor();
+  context_.workers.Give([reactor, response, view] {
+    response->set_map_digest(view->Digest());
+    reactor->Finish(grpc::Status::OK);
+  });
+  return reactor;
 }
 
 grpc::ServerUnaryReactor* MissionService::DropContact(

@@ -1,5 +1,6 @@
 #include "server/obstacle_service.h"
 
+#include <atomic>
 #include <deque>
 #include <memory>
 #include <utility>
@@ -22,6 +23,11 @@ grpc::ServerUnaryReactor* Reply(grpc::CallbackServerContext* call,
   return reactor;
 }
 
+absl::Status TooManyBulkStreams() {
+  return TooManyCalls("GetRegion and GetContactHistory streams",
+                      kMaxBulkStreams);
+}
+
 // A server stream that ends at once with an error.
 template <typename Response>
 class FailedStream final : public grpc::ServerWriteReactor<Response> {
@@ -33,10 +39,13 @@ class FailedStream final : public grpc::ServerWriteReactor<Response> {
 };
 
 // Writes one block of a region after the other, as fast as the client reads.
+// Blocks are made by a worker; at any time a block is being made or a write is
+// under way, so the state needs no mutex.
 class RegionStream final
     : public grpc::ServerWriteReactor<v1::GetRegionResponse> {
  public:
-  explicit RegionStream(Region region) : region_(std::move(region)) {}
+  RegionStream(ServerContext& context, Region region)
+      : context_(context), region_(std::move(region)) {}
 
   void Begin(const absl::Status& status, ViewPtr view) {
     const absl::Status opened =
@@ -48,52 +57,41 @@ class RegionStream final
     WriteNext();
   }
   void OnWriteDone(bool ok) override {
-    if (!ok) {
-      Finish(grpc::Status(grpc::StatusCode::CANCELLED, "the client has gone"));
-      return;
-    }
+    if (!ok) gone_ = true;
     WriteNext();
   }
-  void OnDone() override { delete this; }
+  // May come while a worker makes a block: it then stops and finishes.
+  void OnCancel() override { gone_ = true; }
+  void OnDone() override {
+    context_.bulk_calls.GiveBack();
+    delete this;
+  }
 
  private:
   void WriteNext() {
-    if (region_.Next(&response_)) {
-      StartWrite(&response_);
-    } else {
-      Finish(grpc::Status::OK);
-    }
+    context_.workers.Give([this] {
+      const Region::Step step = gone_ || context_.draining
+                                    ? Region::Step::kStopped
+                                    : region_.Next(gone_, &response_);
+      switch (step) {
+        case Region::Step::kBlock:
+          StartWrite(&response_);
+          break;
+        case Region::Step::kEnd:
+          Finish(grpc::Status::OK);
+          break;
+        case Region::Step::kStopped:
+          Finish(ToGrpc(gone_ ? absl::CancelledError("the client has gone")
+                              : ShuttingDown()));
+          break;
+      }
+    });
   }
 
+  ServerContext& context_;
   Region region_;
   v1::GetRegionResponse response_;
-};
-
-// Writes messages that are there already.
-class HistoryStream final
-    : public grpc::ServerWriteReactor<v1::GetContactHistoryResponse> {
- public:
-  explicit HistoryStream(std::deque<v1::GetContactHistoryResponse> messages)
-      : messages_(std::move(messages)) {
-    WriteNext();
-  }
-  void OnWriteDone(bool ok) override {
-    messages_.pop_front();
-    if (!ok) messages_.clear();
-    WriteNext();
-  }
-  void OnDone() override { delete this; }
-
- private:
-  void WriteNext() {
-    if (messages_.empty()) {
-      Finish(grpc::Status::OK);
-    } else {
-      StartWrite(&messages_.front());
-    }
-  }
-
-  std::deque<v1::GetContactHistoryResponse> messages_;
+  std::atomic<bool> gone_{false};
 };
 
 absl::StatusOr<std::deque<v1::GetContactHistoryResponse>> ReadHistory(
@@ -143,6 +141,46 @@ absl::StatusOr<std::deque<v1::GetContactHistoryResponse>> ReadHistory(
   return messages;
 }
 
+// Reads a history on a worker, then writes it as fast as the client reads.
+class HistoryStream final
+    : public grpc::ServerWriteReactor<v1::GetContactHistoryResponse> {
+ public:
+  HistoryStream(ServerContext& context,
+                const v1::GetContactHistoryRequest& request)
+      : context_(context) {
+    context_.workers.Give([this, request] {
+      auto messages = ReadHistory(context_.file, request);
+      if (!messages.ok()) {
+        Finish(ToGrpc(messages.status()));
+        return;
+      }
+      messages_ = *std::move(messages);
+      WriteNext();
+    });
+  }
+  void OnWriteDone(bool ok) override {
+    messages_.pop_front();
+    if (!ok) messages_.clear();
+    WriteNext();
+  }
+  void OnDone() override {
+    context_.bulk_calls.GiveBack();
+    delete this;
+  }
+
+ private:
+  void WriteNext() {
+    if (messages_.empty()) {
+      Finish(grpc::Status::OK);
+    } else {
+      StartWrite(&messages_.front());
+    }
+  }
+
+  ServerContext& context_;
+  std::deque<v1::GetContactHistoryResponse> messages_;
+};
+
 }  // namespace
 
 grpc::ServerUnaryReactor* ObstacleService::QueryObstacle(
@@ -191,7 +229,10 @@ grpc::ServerWriteReactor<v1::GetRegionResponse>* ObstacleService::GetRegion(
   if (!region.ok()) {
     return new FailedStream<v1::GetRegionResponse>(region.status());
   }
-  auto* stream = new RegionStream(*std::move(region));
+  if (!context_.bulk_calls.Take()) {
+    return new FailedStream<v1::GetRegionResponse>(TooManyBulkStreams());
+  }
+  auto* stream = new RegionStream(context_, *std::move(region));
   AtRevision(context_, *call, request->min_revision(),
              [stream](const absl::Status& status, const ViewPtr& view) {
                stream->Begin(status, view);
@@ -217,11 +258,11 @@ grpc::ServerUnaryReactor* ObstacleService::ListContacts(
 grpc::ServerWriteReactor<v1::GetContactHistoryResponse>*
 ObstacleService::GetContactHistory(
     grpc::CallbackServerContext*, const v1::GetContactHistoryRequest* request) {
-  auto messages = ReadHistory(context_.file, *request);
-  if (!messages.ok()) {
-    return new FailedStream<v1::GetContactHistoryResponse>(messages.status());
+  if (!context_.bulk_calls.Take()) {
+    return new FailedStream<v1::GetContactHistoryResponse>(
+        TooManyBulkStreams());
   }
-  return new HistoryStream(*std::move(messages));
+  return new HistoryStream(context_, *request);
 }
 
 grpc::ServerUnaryReactor* ObstacleService::CheckTrajectory(

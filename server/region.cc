@@ -18,6 +18,7 @@ namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr double kRadPerDeg = std::numbers::pi / 180;
+constexpr double kEarthRadiusM = 6'400'000;  // The greatest, at a pole.
 
 // Metres of one degree of latitude and of longitude: radii of curvature of
 // the WGS 84 ellipsoid in the meridian and the prime vertical (Rapp 1991,
@@ -71,9 +72,10 @@ absl::StatusOr<Region> Region::Create(const v1::GetRegionRequest& request,
     return InvalidField(FieldPath(north_east_path, "longitude_deg").ToString(),
                         "equals south_west.longitude_deg: the area is empty");
   }
-  FATHOM_RETURN_IF_ERROR(CheckNumber(
-      request.resolution_m(), {.min = kMinResolutionM, .max = 1e7, .unit = "m"},
-      FieldPath(root, "resolution_m")));
+  FATHOM_RETURN_IF_ERROR(
+      CheckNumber(request.resolution_m(),
+                  {.min = kMinResolutionM, .max = kMaxResolutionM, .unit = "m"},
+                  FieldPath(root, "resolution_m")));
   if (!request.activity_id().empty()) {
     FATHOM_RETURN_IF_ERROR(
         CheckId(request.activity_id(), FieldPath(root, "activity_id")));
@@ -104,6 +106,15 @@ absl::StatusOr<Region> Region::Create(const v1::GetRegionRequest& request,
   region.latitude_step_deg_ = request.resolution_m() / lengths.latitude_m;
   region.longitude_step_deg_ =
       request.resolution_m() / std::max(lengths.longitude_m, 1.0);
+  // A parallel of latitude bows from the chord of two of its points by
+  // w^2 tan(latitude) / (8 R) with w = dlon R cos(latitude): at most
+  // dlon^2 R / 16, at 45 degrees. What the projections bend the sides of so
+  // small a cell is less than the second term.
+  const double longitude_step = region.longitude_step_deg_ * kRadPerDeg;
+  const double latitude_step = region.latitude_step_deg_ * kRadPerDeg;
+  region.bow_m_ =
+      (longitude_step * longitude_step + latitude_step * latitude_step) *
+      kEarthRadiusM / 16;
   // A whole number of cells must not become one more by rounding.
   const double rows =
       std::max(1.0, std::ceil(height_deg / region.latitude_step_deg_ - 1e-9));
@@ -134,8 +145,11 @@ absl::Status Region::Open(std::shared_ptr<const map::ObstacleMapView> view) {
           activity_id_.value));
     }
   }
-  bounds_level_ = view->global().root().LevelFor(resolution_m_) - 1;
   view_ = std::move(view);
+  shoalest_.emplace(*view_, ShoalestOptions{.activity = activity_,
+                                            .layers = layers_,
+                                            .resolution_m = resolution_m_,
+                                            .bow_m = bow_m_});
   return absl::OkStatus();
 }
 
@@ -145,39 +159,54 @@ std::optional<map::SeabedEstimate> Region::SeabedAt(
   return view_->SeabedAt(point, layers_);
 }
 
-float Region::ShoalestIn(const map::GeodeticPoint& center,
-                         const map::SeabedEstimate& seabed) const {
-  float shoalest_m = seabed.estimate.depth_m;
-  if (!std::isnan(seabed.estimate.shoalest_m)) {
-    shoalest_m = std::min(shoalest_m, seabed.estimate.shoalest_m);
+void Region::Corners(double north_deg, double west_deg, uint32_t row,
+                     uint32_t columns,
+                     std::vector<map::GeodeticPoint>& out) const {
+  out.clear();
+  const double latitude_deg =
+      std::max(north_deg - row * latitude_step_deg_, -90.0);
+  for (uint32_t column = 0; column <= columns; ++column) {
+    out.push_back(
+        {.latitude_deg = latitude_deg,
+         .longitude_deg = Wrap(west_deg + column * longitude_step_deg_)});
   }
-  if (seabed.local || seabed.estimate.cell_size_m >= resolution_m_) {
-    return shoalest_m;
-  }
-  // Finer leaves lie in the answer cell. The quadtree cells at its corners are
-  // at least as large as it, so together they cover it.
-  const int level = std::max(bounds_level_, 0);
-  const map::RootSquare& root = view_->global().root();
-  for (const double north : {-0.5, 0.5}) {
-    for (const double east : {-0.5, 0.5}) {
-      const auto cell = root.Locate(
-          {.latitude_deg = std::clamp(
-               center.latitude_deg + north * latitude_step_deg_, -90.0, 90.0),
-           .longitude_deg =
-               Wrap(center.longitude_deg + east * longitude_step_deg_)},
-          level);
-      if (!cell.has_value()) continue;
-      const auto bounds = view_->global().Bounds(*cell);
-      if (bounds.has_value()) {
-        shoalest_m = std::min(shoalest_m, bounds->shoalest_m);
-      }
-    }
-  }
-  return shoalest_m;
 }
 
-bool Region::Next(v1::GetRegionResponse* out) {
-  if (next_row_ >= rows_) return false;
+void Region::WriteCell(const map::GeodeticPoint& center, float shoalest_m,
+                       int i, v1::RegionTile* tile) const {
+  const auto seabed = SeabedAt(center);
+  if (seabed.has_value()) {
+    const map::DepthEstimate& estimate = seabed->estimate;
+    (*tile->mutable_kind())[static_cast<size_t>(i)] =
+        static_cast<char>(estimate.kind);
+    (*tile->mutable_layer())[static_cast<size_t>(i)] = static_cast<char>(
+        seabed->local ? v1::MAP_LAYER_LOCAL : v1::MAP_LAYER_GLOBAL);
+    tile->set_depth_m(i, estimate.depth_m);
+    tile->set_std_m(i, estimate.std_m);
+    if (estimate.time_s != 0) {
+      const double age_s = ToSeconds(now_.time_since_epoch()) -
+                           static_cast<double>(estimate.time_s);
+      tile->set_age_s(i, static_cast<float>(std::max(0.0, age_s)));
+    }
+    if (!std::isnan(estimate.hazard_m)) {
+      // Rare: the array is made when the first hazard is met.
+      if (tile->hazard_m().empty()) {
+        tile->mutable_hazard_m()->Resize(tile->depth_m_size(), kNaN);
+      }
+      tile->set_hazard_m(i, estimate.hazard_m);
+    }
+    // fmin passes over a NaN.
+    for (const float shoal_m :
+         {estimate.depth_m, estimate.shoalest_m, estimate.hazard_m}) {
+      shoalest_m = std::fmin(shoalest_m, shoal_m);
+    }
+  }
+  tile->set_shoalest_m(i, shoalest_m);
+}
+
+Region::Step Region::Next(const std::atomic<bool>& stop,
+                          v1::GetRegionResponse* out) {
+  if (next_row_ >= rows_) return Step::kEnd;
   const uint32_t rows = std::min(kRegionTileSide, rows_ - next_row_);
   const uint32_t columns = std::min(kRegionTileSide, columns_ - next_column_);
   out->Clear();
@@ -203,28 +232,26 @@ bool Region::Next(v1::GetRegionResponse* out) {
   tile->mutable_age_s()->Resize(cells, kNaN);
   tile->mutable_shoalest_m()->Resize(cells, kNaN);
   tile->mutable_kind()->assign(static_cast<size_t>(cells), '\0');
-  const double now_s = ToSeconds(now_.time_since_epoch());
+  tile->mutable_layer()->assign(static_cast<size_t>(cells), '\0');
+  std::vector<map::GeodeticPoint> north;
+  std::vector<map::GeodeticPoint> south;
+  std::vector<float> shoalest_m;
+  Corners(north_deg, west_deg, 0, columns, south);
+  shoalest_->StartBlock();
   for (uint32_t row = 0; row < rows; ++row) {
+    north.swap(south);
+    Corners(north_deg, west_deg, row + 1, columns, south);
+    if (!shoalest_->NextRow(north, south, stop, shoalest_m)) {
+      return Step::kStopped;
+    }
     for (uint32_t column = 0; column < columns; ++column) {
       const map::GeodeticPoint center = {
           .latitude_deg =
               std::max(north_deg - (row + 0.5) * latitude_step_deg_, -90.0),
           .longitude_deg =
               Wrap(west_deg + (column + 0.5) * longitude_step_deg_)};
-      const auto seabed = SeabedAt(center);
-      if (!seabed.has_value()) continue;
-      const map::DepthEstimate& estimate = seabed->estimate;
-      const int i = static_cast<int>(row * columns + column);
-      (*tile->mutable_kind())[static_cast<size_t>(i)] =
-          static_cast<char>(estimate.kind);
-      tile->set_depth_m(i, estimate.depth_m);
-      tile->set_std_m(i, estimate.std_m);
-      if (estimate.time_s != 0) {
-        tile->set_age_s(
-            i, static_cast<float>(std::max(
-                   0.0, now_s - static_cast<double>(estimate.time_s))));
-      }
-      tile->set_shoalest_m(i, ShoalestIn(center, *seabed));
+      WriteCell(center, shoalest_m[column],
+                static_cast<int>(row * columns + column), tile);
     }
   }
   next_column_ += columns;
@@ -232,7 +259,7 @@ bool Region::Next(v1::GetRegionResponse* out) {
     next_column_ = 0;
     next_row_ += rows;
   }
-  return true;
+  return Step::kBlock;
 }
 
 }  // namespace fathom::server

@@ -7,15 +7,18 @@
 #ifndef FATHOM_SERVER_REGION_H_
 #define FATHOM_SERVER_REGION_H_
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "base/time.h"
 #include "fathom/v1/obstacle_service.pb.h"
 #include "map/obstacle_map/obstacle_map_view.h"
+#include "server/region_shoalest.h"
 
 namespace fathom::server {
 
@@ -35,18 +38,25 @@ class Region {
   uint32_t rows() const { return rows_; }
   uint32_t columns() const { return columns_; }
 
-  // Writes the next block, rows from north to south; false if there is none.
-  // REQUIRES: Open. About 0.2 us a cell.
-  bool Next(v1::GetRegionResponse* out);
+  // What Next did.
+  enum class Step { kBlock, kEnd, kStopped };
+
+  // Writes the next block, rows from north to south. kStopped soon after
+  // `stop` is set (about a millisecond), with an unfinished block.
+  // REQUIRES: Open. About 1 us a cell (region_shoalest.h).
+  Step Next(const std::atomic<bool>& stop, v1::GetRegionResponse* out);
 
  private:
   Region() = default;
 
   std::optional<map::SeabedEstimate> SeabedAt(
       const map::GeodeticPoint& point) const;
-  // The shoalest depth that the map can show in the cell around `center`.
-  float ShoalestIn(const map::GeodeticPoint& center,
-                   const map::SeabedEstimate& seabed) const;
+  // Writes one cell: the map at its centre.
+  void WriteCell(const map::GeodeticPoint& center, float shoalest_m, int i,
+                 v1::RegionTile* tile) const;
+  // Corners of `columns` cells on the block's grid line `row`.
+  void Corners(double north_deg, double west_deg, uint32_t row,
+               uint32_t columns, std::vector<map::GeodeticPoint>& out) const;
 
   std::shared_ptr<const map::ObstacleMapView> view_;
   const map::ActivityView* activity_ = nullptr;
@@ -59,9 +69,9 @@ class Region {
   double resolution_m_ = 0;
   uint32_t rows_ = 0;
   uint32_t columns_ = 0;
-  // Level of the quadtree whose cells are at least as large as an answer
-  // cell; -1: the root itself is smaller.
-  int bounds_level_ = -1;
+  // How far a cell's side bows beyond its corners, at most.
+  double bow_m_ = 0;
+  std::optional<RegionShoalest> shoalest_;
   uint32_t next_row_ = 0;
   uint32_t next_column_ = 0;
 };

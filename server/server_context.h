@@ -16,6 +16,7 @@
 #include "server/errors.h"
 #include "server/limits.h"
 #include "server/map_keeper.h"
+#include "server/workers.h"
 #include "storage/mission_file.h"
 
 namespace fathom::server {
@@ -26,6 +27,8 @@ struct ServerContext {
   storage::MissionFile& file;
   const Clock& clock;
   Courier courier{};
+  Workers workers{kWorkerThreads};
+  CallSlots bulk_calls{kMaxBulkStreams};
   CallRegistry ingest_calls{kMaxIngestStreams};
   CallRegistry import_calls{kMaxImports};
   std::atomic<bool> draining{false};

@@ -146,6 +146,24 @@ absl::Status WriteContacts(const map::ContactsView& before,
   return status;
 }
 
+absl::Status WriteRejects(const map::RejectCounts& before,
+                          const map::RejectCounts& now,
+                          Connection& connection) {
+  if (before == now) return absl::OkStatus();
+  FATHOM_ASSIGN_OR_RETURN(
+      Statement replace,
+      connection.Prepare("INSERT OR REPLACE INTO contact_reject (reason, "
+                         "report_count) VALUES (?, ?)"));
+  for (std::size_t i = 1; i < map::kRejectReasonEnd; ++i) {
+    const auto reason = static_cast<map::RejectReason>(i);
+    if (now.count(reason) == before.count(reason)) continue;
+    replace.BindUint(0, i);
+    replace.BindUint(1, now.count(reason));
+    FATHOM_RETURN_IF_ERROR(replace.Run());
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 absl::Status WriteCheckpoint(const Checkpoint& checkpoint,
@@ -155,6 +173,7 @@ absl::Status WriteCheckpoint(const Checkpoint& checkpoint,
   if (before == nullptr) {
     FATHOM_RETURN_IF_ERROR(connection.Execute(
         "DELETE FROM tile; DELETE FROM local_block; DELETE FROM activity; "
+        "DELETE FROM contact_reject; "
         "UPDATE contact SET content = NULL WHERE content IS NOT NULL"));
   }
   FATHOM_RETURN_IF_ERROR(
@@ -166,6 +185,10 @@ absl::Status WriteCheckpoint(const Checkpoint& checkpoint,
   FATHOM_RETURN_IF_ERROR(WriteContacts(
       before != nullptr ? before->contacts() : map::ContactsView(),
       now.contacts(), contacts));
+  FATHOM_RETURN_IF_ERROR(
+      WriteRejects(before != nullptr ? before->counters().contact_rejects
+                                     : map::RejectCounts(),
+                   now.counters().contact_rejects, connection));
   FATHOM_ASSIGN_OR_RETURN(
       Statement trim,
       connection.Prepare("DELETE FROM journal WHERE last_revision <= ?"));
@@ -174,9 +197,10 @@ absl::Status WriteCheckpoint(const Checkpoint& checkpoint,
   FATHOM_ASSIGN_OR_RETURN(
       Statement mark,
       connection.Prepare("UPDATE mission SET checkpoint_revision = ?, "
-                         "checkpoint_as_of_us = ?"));
+                         "checkpoint_as_of_us = ?, degraded_updates = ?"));
   mark.BindUint(0, now.revision());
   mark.BindInt(1, ToUnixMicros(now.as_of()));
+  mark.BindUint(2, now.counters().degraded);
   return mark.Run();
 }
 

@@ -160,13 +160,27 @@ absl::Status LoadContacts(Connection& connection, Loaded& loaded) {
 absl::Status LoadCheckpointMark(Connection& connection, Loaded& loaded) {
   FATHOM_ASSIGN_OR_RETURN(
       Statement select,
-      connection.Prepare(
-          "SELECT checkpoint_revision, checkpoint_as_of_us FROM mission"));
+      connection.Prepare("SELECT checkpoint_revision, checkpoint_as_of_us, "
+                         "degraded_updates FROM mission"));
   FATHOM_ASSIGN_OR_RETURN(const bool row, select.Step());
   if (!row) return absl::DataLossError("the mission table is empty");
   loaded.checkpoint_revision = select.ColumnUint(0);
   loaded.checkpoint_as_of = TimeFromUnixMicros(select.ColumnInt(1));
-  return absl::OkStatus();
+  loaded.counters.degraded = select.ColumnUint(2);
+  FATHOM_ASSIGN_OR_RETURN(
+      Statement rejects,
+      connection.Prepare("SELECT reason, report_count FROM contact_reject"));
+  while (true) {
+    FATHOM_ASSIGN_OR_RETURN(const bool more, rejects.Step());
+    if (!more) return absl::OkStatus();
+    const std::uint64_t reason = rejects.ColumnUint(0);
+    if (reason == 0 || reason >= map::kRejectReasonEnd) {
+      return absl::DataLossError(absl::StrFormat(
+          "contact_reject: reason %d is none of this version's", reason));
+    }
+    loaded.counters.contact_rejects.Add(static_cast<map::RejectReason>(reason),
+                                        rejects.ColumnUint(1));
+  }
 }
 
 absl::Status LoadJournal(Connection& connection, Loaded& loaded) {

@@ -43,8 +43,8 @@ inline constexpr std::int32_t kApplicationId = 0x4674686D;
 
 // The user_version that this program writes, and the oldest that it reads.
 // Older ones were never released.
-inline constexpr int kSchemaVersion = 4;
-inline constexpr int kOldestSchemaVersion = 4;
+inline constexpr int kSchemaVersion = 5;
+inline constexpr int kOldestSchemaVersion = 5;
 
 // Size of the write-ahead log beyond which Commit copies it into the file
 // after its fsync. Big enough that the copy is rare beside the commits (a

@@ -161,6 +161,8 @@ struct Loaded {
   // Revision and time of the newest evidence of the checkpoint.
   std::uint64_t checkpoint_revision = 0;
   Time checkpoint_as_of{};
+  // As of the checkpoint.
+  map::MissionCounters counters;
   // Events behind the checkpoint, to be replayed in this order.
   std::vector<JournalRecord> journal;
   // Revision of the last record, or of the checkpoint: where the map will be.

@@ -38,6 +38,7 @@ absl::Status RestoreCheckpoint(Loaded& loaded, map::ObstacleMap& map) {
     FATHOM_RETURN_IF_ERROR(
         Misfit(map.RestoreContact(std::move(contact)), name));
   }
+  map.RestoreCounters(loaded.counters);
   return Misfit(
       map.RestoreRevision(loaded.checkpoint_revision, loaded.checkpoint_as_of),
       "the checkpoint");

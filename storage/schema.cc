@@ -35,7 +35,13 @@ CREATE TABLE mission (
   max_contacts INTEGER NOT NULL,
   contact_filter TEXT NOT NULL,
   checkpoint_revision INTEGER NOT NULL,
-  checkpoint_as_of_us INTEGER NOT NULL
+  checkpoint_as_of_us INTEGER NOT NULL,
+  degraded_updates INTEGER NOT NULL
+) STRICT;
+
+CREATE TABLE contact_reject (
+  reason INTEGER PRIMARY KEY,
+  report_count INTEGER NOT NULL
 ) STRICT;
 
 CREATE TABLE tile (
@@ -230,8 +236,9 @@ absl::Status CreateSchema(Connection& connection,
       Statement insert,
       connection.Prepare(absl::StrFormat(
           "INSERT INTO mission (only_row, %s, checkpoint_revision, "
-          "checkpoint_as_of_us) VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, "
-          "?, ?, ?, 0, 0)",
+          "checkpoint_as_of_us, degraded_updates) VALUES (1, ?, ?, ?, ?, ?, ?, "
+          "?, ?, ?, ?, ?, "
+          "?, ?, ?, 0, 0, 0)",
           kMissionColumns)));
   insert.BindText(0, metadata.mission_id);
   insert.BindText(1, metadata.name);

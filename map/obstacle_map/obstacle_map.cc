@@ -108,7 +108,7 @@ absl::StatusOr<LocalMap::UpdateResult> ObstacleMap::ApplyPing(
 ContactOutcome ObstacleMap::ApplyContact(const ContactReport& report) {
   ContactOutcome outcome = contacts_.Apply(report);
   if (!outcome.applied && outcome.reason.has_value()) {
-    contact_rejects_.Add(*outcome.reason);
+    counters_.contact_rejects.Add(*outcome.reason);
   }
   Advance(outcome.applied ? report.time : Time{});
   return outcome;
@@ -144,6 +144,7 @@ TransferResult ObstacleMap::TransferEvidence(OpenActivity& open) {
   global_.Conglomerate(MergeRule::kRange, OpenAreas(&open));
   global_view_ = global_.View();
   result.leaves_after = global_view_.known_leaf_count();
+  counters_.degraded += result.degraded;
   return result;
 }
 
@@ -213,6 +214,7 @@ absl::StatusOr<ImportResult> ObstacleMap::Import(const RasterBlock& block,
   result.cells_unknown = imported.cells_unknown;
   result.cells_outside = imported.cells_outside;
   result.degraded = imported.degraded;
+  counters_.degraded += imported.degraded;
   if (last) {
     global_.Conglomerate(MergeRule::kRange, OpenAreas(nullptr));
   }
@@ -235,6 +237,7 @@ std::shared_ptr<const ObstacleMapView> ObstacleMap::View() {
       .activities = activities_,
       .contacts = contacts_.View(),
       .ageing_rate_m2_s = options_.ageing_rate_m2_s,
+      .counters = counters_,
   });
 }
 

@@ -122,8 +122,6 @@ class ObstacleMap {
   // The map as it is. O(open activities + changed pieces).
   std::shared_ptr<const ObstacleMapView> View();
 
-  // Refused reports since the mission began, by reason.
-  const RejectCounts& contact_rejects() const { return contact_rejects_; }
   const MissionOptions& options() const { return options_; }
 
   // ---- Restoring a stored map; before any other change. ----
@@ -133,6 +131,9 @@ class ObstacleMap {
   absl::Status RestoreBlock(const ActivityId& id, BlockIndex index,
                             const LocalBlock& block);
   absl::Status RestoreContact(StoredContact stored);
+  void RestoreCounters(const MissionCounters& counters) {
+    counters_ = counters;
+  }
   // Ends the restoring; must be called, and last. Errors: DATA_LOSS (tiles
   // are missing or hang on none).
   absl::Status RestoreRevision(uint64_t revision, Time as_of);
@@ -168,7 +169,7 @@ class ObstacleMap {
   // The global map as of its last change: where local priors come from.
   GlobalMapView global_view_;
   ContactMap contacts_;
-  RejectCounts contact_rejects_;
+  MissionCounters counters_;
   std::map<ActivityId, OpenActivity> open_;
   // All activities in the order of their start.
   std::vector<std::shared_ptr<const ActivityView>> activities_;

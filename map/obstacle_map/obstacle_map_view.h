@@ -43,6 +43,18 @@ struct ActivityView {
   bool open() const { return local.has_value(); }
 };
 
+// What the map has counted since the mission began; stored with it.
+struct MissionCounters {
+  // Updates of the global map that went to a coarser leaf because max_cells
+  // was reached.
+  uint64_t degraded = 0;
+  // Contact reports that the tracker refused.
+  RejectCounts contact_rejects;
+
+  friend bool operator==(const MissionCounters&,
+                         const MissionCounters&) = default;
+};
+
 // Which layers a seabed estimate may come from.
 enum class LayerChoice { kJoined, kLocalOnly, kGlobalOnly };
 
@@ -60,6 +72,7 @@ class ObstacleMapView {
     // Variance added per second of age of the evidence, m^2/s, >= 0
     // (domain.md section 1, "time"); 0: the thesis's map, which never ages.
     double ageing_rate_m2_s = 0;
+    MissionCounters counters;
   };
 
   explicit ObstacleMapView(Parts parts);
@@ -74,6 +87,7 @@ class ObstacleMapView {
   }
   const ContactsView& contacts() const { return parts_.contacts; }
   double ageing_rate_m2_s() const { return parts_.ageing_rate_m2_s; }
+  const MissionCounters& counters() const { return parts_.counters; }
 
   // The activity, open or ended; nullptr if there never was one.
   const ActivityView* FindActivity(const ActivityId& id) const;

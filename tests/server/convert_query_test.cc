@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -170,6 +171,8 @@ TEST(AnswerBatch, GivesTheSameAnswersAsOneByOne) {
   }
 }
 
+const std::atomic<bool> kNever{false};
+
 // 0.01 deg of latitude and 0.02 deg of longitude, 100 m cells.
 v1::GetRegionRequest SampleRegion() {
   v1::GetRegionRequest request;
@@ -189,7 +192,7 @@ TEST(Region, IsSquareAtItsMiddleAndCoversTheArea) {
   EXPECT_EQ(region.columns(), 17U);
   FATHOM_ASSERT_OK(region.Open(map.View()));
   v1::GetRegionResponse response;
-  ASSERT_TRUE(region.Next(&response));
+  ASSERT_EQ(region.Next(kNever, &response), Region::Step::kBlock);
   EXPECT_EQ(response.total_rows(), 12U);
   const v1::RegionTile& tile = response.tile();
   EXPECT_EQ(tile.rows(), 12U);
@@ -206,7 +209,7 @@ TEST(Region, IsSquareAtItsMiddleAndCoversTheArea) {
   EXPECT_TRUE(std::isnan(tile.depth_m(5 * 17 + 15)));
   EXPECT_TRUE(std::isnan(tile.std_m(5 * 17 + 15)));
   EXPECT_EQ(tile.kind()[5 * 17 + 15], v1::EVIDENCE_KIND_UNSPECIFIED);
-  EXPECT_FALSE(region.Next(&response));
+  EXPECT_EQ(region.Next(kNever, &response), Region::Step::kEnd);
 }
 
 TEST(Region, LargeAreasComeInTilesThatFitTogether) {
@@ -216,7 +219,7 @@ TEST(Region, LargeAreasComeInTilesThatFitTogether) {
   FATHOM_ASSERT_OK(region.Open(SampleMap().View()));
   std::vector<int> seen(size_t{region.rows()} * region.columns());
   v1::GetRegionResponse response;
-  while (region.Next(&response)) {
+  while (region.Next(kNever, &response) == Region::Step::kBlock) {
     const v1::RegionTile& tile = response.tile();
     EXPECT_LE(tile.rows(), kRegionTileSide);
     EXPECT_LE(tile.columns(), kRegionTileSide);
@@ -247,6 +250,7 @@ TEST(Region, NamesEveryBadField) {
        [](auto& r) { r.mutable_south_west()->set_latitude_deg(kNaN); }},
       {"resolution_m", kInvalid, [](auto& r) { r.set_resolution_m(0.05); }},
       {"resolution_m", kInvalid, [](auto& r) { r.clear_resolution_m(); }},
+      {"resolution_m", kInvalid, [](auto& r) { r.set_resolution_m(1.1e5); }},
       {"resolution_m", kNotFinite, [](auto& r) { r.set_resolution_m(kNaN); }},
       {"activity_id", kInvalid, [](auto& r) { r.set_activity_id("a b"); }},
       {"layer", kInvalid,
@@ -285,6 +289,15 @@ TEST(Region, MayCrossTheAntimeridian) {
   FATHOM_ASSERT_OK_AND_ASSIGN(const Region region,
                               Region::Create(request, kNow));
   EXPECT_EQ(region.columns(), 17U);  // 0.02 deg, as in SampleRegion
+}
+
+TEST(Region, StopsInTheMiddleOfABlock) {
+  FATHOM_ASSERT_OK_AND_ASSIGN(Region region,
+                              Region::Create(SampleRegion(), kNow));
+  FATHOM_ASSERT_OK(region.Open(SampleMap().View()));
+  const std::atomic<bool> stop{true};
+  v1::GetRegionResponse response;
+  EXPECT_EQ(region.Next(stop, &response), Region::Step::kStopped);
 }
 
 }  // namespace

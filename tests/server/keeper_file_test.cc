@@ -147,7 +147,6 @@ TEST_F(KeeperFileTest, ManySourcesAndReadersAtOnce) {
             {.position = {41.5025, -71.397}, .depth_m = 10, .time = kStart});
         EXPECT_LE(answer.probability, 1);
         (void)keeper.storage_state();
-        (void)keeper.contact_rejects();
       }
     });
   }

@@ -188,7 +188,9 @@ TEST_F(MapKeeperTest, ContactReportsGiveAHistoryAndRefusalsTheirReason) {
   size_t history = 0;
   for (const SeenBatch& batch : store_.seen()) history += batch.history;
   EXPECT_EQ(history, 1U);
-  EXPECT_EQ(keeper_->contact_rejects().count(map::RejectReason::kTooLate), 1U);
+  EXPECT_EQ(keeper_->View()->counters().contact_rejects.count(
+                map::RejectReason::kTooLate),
+            1U);
 }
 
 TEST_F(MapKeeperTest, CommandsTellTheirResultWhenDurable) {
