@@ -22,7 +22,9 @@ class Coverage {
   void Add(const map::DepthEstimate& estimate, double truth_m) {
     const double z = std::abs(truth_m - estimate.depth_m) / estimate.std_m;
     ++count_;
-    for (int k = 0; k < 3; ++k) within_[k] += z <= k + 1;
+    for (std::size_t k = 0; k < 3; ++k) {
+      within_[k] += z <= static_cast<double>(k) + 1;
+    }
     square_ += z * z;
   }
   void WriteTo(nlohmann::json& row) const {
@@ -64,12 +66,14 @@ double MeanRmse(const Window& window, const map::LocalMapView& view) {
       const auto estimate = view.AtCell({.i = i, .j = j});
       if (!estimate) continue;
       double mean_m = 0;
-      for (int n = 0; n < kGrid * kGrid; ++n) {
-        mean_m += window
-                      .DepthAt((i + (n / kGrid + 0.5) / kGrid) * window.cell_m,
-                               (j + (n % kGrid + 0.5) / kGrid) * window.cell_m)
-                      .value() /
-                  (kGrid * kGrid);
+      for (int row = 0; row < kGrid; ++row) {
+        for (int col = 0; col < kGrid; ++col) {
+          mean_m += window
+                        .DepthAt((i + (row + 0.5) / kGrid) * window.cell_m,
+                                 (j + (col + 0.5) / kGrid) * window.cell_m)
+                        .value() /
+                    (kGrid * kGrid);
+        }
       }
       square += std::pow(estimate->depth_m - mean_m, 2);
       ++count;

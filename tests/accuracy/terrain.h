@@ -52,7 +52,9 @@ class Terrain {
         depths_m_(std::move(depths_m)) {}
 
   float Node(int row, int col) const {
-    return depths_m_[static_cast<std::size_t>(row * cols_ + col)];
+    return depths_m_[static_cast<std::size_t>(row) *
+                         static_cast<std::size_t>(cols_) +
+                     static_cast<std::size_t>(col)];
   }
 
   int rows_;  // From the south.
