@@ -53,16 +53,21 @@ double Excess(const Evidence& evidence) {
   return (evidence.scatter - (n - 1.0)) * n / evidence.weight;
 }
 
-// The mean of a normal cut off below 0: x + phi(x) / Phi(x) in units of its
-// std, never 0.
+// The mean of a normal cut off below 0, in units of its std x + phi(x) /
+// Phi(x); never 0. That function solves g (g - x) = c / 4 with a c that falls
+// from 4 to 0; c is approximated, which costs one exp instead of exp and erfc
+// and leaves g right to 1.5 % (tested).
 double MeanAboveZero(const Witness& witness) {
-  const double std_m2 = std::sqrt(witness.variance_m4);
-  const double x = witness.variability_m2 / std_m2;
-  if (x > 4.0) return witness.variability_m2;
-  // Below -6 the quotient is 1 / |x| to 5 %, and erfc runs out of digits.
-  if (x < -6.0) return -std_m2 / x;
-  const double density = std::exp(-0.5 * x * x) * 0.3989422804;
-  return std_m2 * (x + density / (0.5 * std::erfc(-x * 0.7071067812)));
+  const auto std_m2 = static_cast<float>(std::sqrt(witness.variance_m4));
+  const float x = static_cast<float>(witness.variability_m2) / std_m2;
+  if (x > 4.0f) return witness.variability_m2;
+  const float y = std::max(x, -20.0f);
+  const float bend = y > 0.0f ? 0.2164f : 0.0433f;
+  const float c = 4.0f / (1.0f + 0.5708f * std::exp(y * (0.8749f + bend * y)));
+  // For x < 0 the sum of two numbers that nearly cancel is avoided.
+  const float root = std::sqrt(x * x + c);
+  const float g = x > 0.0f ? 0.5f * (x + root) : 0.5f * c / (root - x);
+  return double{std_m2} * double{g};
 }
 
 // Squared steps between neighbours along one axis.
@@ -172,7 +177,9 @@ double VariabilityInside(const Evidence& evidence,
   const double excess = Excess(evidence);
   const double own_m2 = excess / freedom;
   const double noise_m2 = evidence.count / double{evidence.weight};
-  const double expected_m2 = MeanAboveZero(region);
+  // What tau^2 may be, for the error of the own scatter: a rough value will do.
+  const double expected_m2 =
+      std::max(region.variability_m2, 0.8 * std::sqrt(region.variance_m4));
   Hearing hearing;
   hearing.Add(region);
   hearing.Add({own_m2, 2.0 * Square(noise_m2 + expected_m2) / freedom});

@@ -40,6 +40,8 @@ float HazardDepth(const Evidence& evidence, double variability_m2) {
   // mean' - z_s = (mean - z_s) n / (n - 1).
   const double above_m =
       (double{evidence.mean_m} - double{evidence.shoalest_m}) * others;
+  // LeastOfNormals is never below 2.5: most cells need no logarithm.
+  if (above_m * above_m <= 6.25 * stated_m2 * others) return kNone;
   const double bound = LeastOfNormals(n);
   const double explained_m2 =
       (bound * bound * stated_m2 + kSlopeShare * kSlopeShare * variability_m2) *

@@ -22,8 +22,11 @@ constexpr double kMostTypical = 4.0;
 // is the variance inside.
 constexpr double kInsideUnitSquare = 0.2;
 
-// h^1.5 from h^2.
-double Power(double square) { return std::sqrt(square * std::sqrt(square)); }
+// h^1.5 of a vector of cells.
+float Power(std::int32_t north, std::int32_t east) {
+  const auto square = static_cast<float>(north * north + east * east);
+  return std::sqrt(square * std::sqrt(square));
+}
 
 }  // namespace
 
@@ -33,8 +36,8 @@ std::optional<DepthEstimate> ReadSmoothed(std::span<const MeasuredNear> near,
   const std::size_t count = std::min(near.size(), kMaxMeasuredNear);
 
   // Noise of the means, and what the cells' scatter says of variability.
-  std::array<double, kMaxMeasuredNear> noise_m2;
-  std::array<double, kMaxMeasuredNear> apart;  // h_k^1.5
+  std::array<float, kMaxMeasuredNear> noise_m2;
+  std::array<float, kMaxMeasuredNear> apart;  // h_k^1.5
   double excess = 0.0;
   double stated_m2 = 0.0;
   double freedom = 0.0;
@@ -42,44 +45,40 @@ std::optional<DepthEstimate> ReadSmoothed(std::span<const MeasuredNear> near,
   for (std::size_t k = 0; k < count; ++k) {
     const Evidence& evidence = near[k].evidence;
     const double n = evidence.count;
-    noise_m2[k] = 1.0 / evidence.weight;
+    noise_m2[k] = 1.0f / evidence.weight;
     excess += (evidence.scatter - (n - 1.0)) * n * noise_m2[k];
     stated_m2 += (n - 1.0) * n * noise_m2[k];
     freedom += n - 1.0;
     oldest_s = std::min(oldest_s, evidence.time_s);
-    apart[k] =
-        Power(near[k].north * near[k].north + near[k].east * near[k].east);
+    apart[k] = Power(near[k].north, near[k].east);
   }
   // What chance alone may bring about is not taken for variability.
   const double scatter_m2 =
       freedom > 0.0 ? (excess - stated_m2 * std::sqrt(2.0 / freedom)) / freedom
                     : 0.0;
 
-  // R from the pairs, each mean's share of its cell's variability taken off.
-  std::array<std::array<double, kMaxMeasuredNear>, kMaxMeasuredNear> between;
-  double rough_sum = 0.0;
-  double noise_sum = 0.0;
-  double pairs = 0.0;
+  // R from the pairs, the stated noise taken off.
+  std::array<std::array<float, kMaxMeasuredNear>, kMaxMeasuredNear> between;
+  float rough_sum = 0.0f;
+  float noise_sum = 0.0f;
   for (std::size_t a = 0; a < count; ++a) {
     for (std::size_t b = 0; b < a; ++b) {
-      const std::int32_t north = near[a].north - near[b].north;
-      const std::int32_t east = near[a].east - near[b].east;
-      between[a][b] = Power(north * north + east * east);
-      const double step_m =
-          double{near[a].evidence.mean_m} - double{near[b].evidence.mean_m};
-      const double noise = noise_m2[a] + noise_m2[b];
-      rough_sum += (step_m * step_m - noise) / between[a][b];
-      noise_sum += noise / between[a][b];
-      pairs += 1.0;
+      between[a][b] =
+          Power(near[a].north - near[b].north, near[a].east - near[b].east);
+      const float per = 1.0f / between[a][b];
+      const float step_m = near[a].evidence.mean_m - near[b].evidence.mean_m;
+      const float noise = noise_m2[a] + noise_m2[b];
+      rough_sum += (step_m * step_m - noise) * per;
+      noise_sum += noise * per;
     }
   }
   const double typical_m = kTypicalSlope * cell_size_m;
   double rough_m2 = typical_m * typical_m;
-  if (pairs > 0.0) {
+  if (count > 1) {
     // Pairs share their ends: `count` cells hold count - 1 steps.
     const double steps = static_cast<double>(count) - 1.0;
-    // Not below what the noise could hide: the mean of a normal about 0, cut
-    // off below 0, is 0.8 of its std.
+    const double pairs = 0.5 * static_cast<double>(count) * steps;
+    // Not below a part of what the noise could hide.
     const double hidden = 0.15 * std::sqrt(2.0 / steps) * noise_sum / pairs;
     const double by_pairs = std::max(hidden, rough_sum / pairs);
     const double guess = std::min(rough_m2, kMostTypical * by_pairs + kMinStdM);
@@ -91,25 +90,28 @@ std::optional<DepthEstimate> ReadSmoothed(std::span<const MeasuredNear> near,
   const double variability_m2 =
       std::max(scatter_m2, kInsideUnitSquare * rough_m2);
   for (std::size_t k = 0; k < count; ++k) {
-    noise_m2[k] += variability_m2 / near[k].evidence.count;
+    noise_m2[k] += static_cast<float>(variability_m2) /
+                   static_cast<float>(near[k].evidence.count);
   }
-  std::array<double, kMaxMeasuredNear> weight;
-  double weight_sum = 0.0;
+  const auto rough = static_cast<float>(rough_m2);
+  std::array<float, kMaxMeasuredNear> weight;
+  float weight_sum = 0.0f;
   for (std::size_t k = 0; k < count; ++k) {
-    weight[k] = 1.0 / (noise_m2[k] + rough_m2 * apart[k]);
+    weight[k] = 1.0f / (noise_m2[k] + rough * apart[k]);
     weight_sum += weight[k];
   }
   double mean_m = 0.0;
-  double error_m2 = 0.0;
+  float error_m2 = 0.0f;
   for (std::size_t k = 0; k < count; ++k) {
     weight[k] /= weight_sum;
-    mean_m += weight[k] * double{near[k].evidence.mean_m};
-    error_m2 += weight[k] * (rough_m2 * apart[k] + weight[k] * noise_m2[k]);
-    for (std::size_t b = 0; b < k; ++b) {
-      error_m2 -= weight[k] * weight[b] * rough_m2 * between[k][b];
-    }
+    mean_m += double{weight[k]} * double{near[k].evidence.mean_m};
+    float others = 0.0f;
+    for (std::size_t b = 0; b < k; ++b) others += weight[b] * between[k][b];
+    error_m2 +=
+        weight[k] * (rough * (apart[k] - others) + weight[k] * noise_m2[k]);
   }
-  const double variance_m2 = (std::max(error_m2, 0.0) + variability_m2) / scale;
+  const double variance_m2 =
+      (std::max(double{error_m2}, 0.0) + variability_m2) / scale;
   return DepthEstimate{
       .depth_m = static_cast<float>(mean_m),
       .std_m = std::max(kMinStdM, static_cast<float>(std::sqrt(variance_m2))),
