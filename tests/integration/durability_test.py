@@ -267,7 +267,8 @@ class Durability(LiveTest):
         self.assertFalse(server.status().activities[0].open)
         after = ask(server, 105, 105).answer.seabed
         self.assertEqual(after.layer, types.MAP_LAYER_GLOBAL)
-        self.assertAlmostEqual(after.depth_m, 23.6, 1)
+        # The global map widens a contradicted prior: see main_job_test.py.
+        self.assertAlmostEqual(after.depth_m, 20.9, 1)
 
         report_contacts(server, [fix_report(1, 0, 0)])
         server.mission.DropContact(mission.DropContactRequest(

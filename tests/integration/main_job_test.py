@@ -50,10 +50,12 @@ class MainJob(LiveTest):
             self.assertGreaterEqual(done.transfer.leaves_written, 1)
             after = ask(server, 105, 105, depth_m=23.6).answer
             self.assertEqual(after.seabed.layer, types.MAP_LAYER_GLOBAL)
-            # The global map widens a chart that a sounding contradicts: 10 m
-            # apart, 16 + 9 explain 25 m2 of 100, so 100 - 9 = 91 for the
-            # chart: k = 91/100, mean = 30 - 9.1 = 20.9.
+            # The local map fuses as its estimator does, the global one widens
+            # a prior that the evidence contradicts: 10 m apart, variance
+            # 100 - 9 = 91, k = 0.91: 30 - 9.1 = 20.9, 0.09 x 91 = 8.19 m^2.
+            # The leaf's std is coded in steps of 0.2 %.
             self.assertAlmostEqual(after.seabed.depth_m, 20.9, 1)
+            self.assertAlmostEqual(after.seabed.std_m, 2.862, delta=0.01)
 
             status = server.status(digest=True)
             self.assertEqual(len(status.map_digest), 16)
