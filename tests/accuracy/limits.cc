@@ -122,6 +122,16 @@ int CheckLimits(const nlohmann::json& report) {
                 Where(row));
   }
   missed += rocks.Report();
+
+  Limit leaves("thesis scene 6.1.2: median leaves", 560);
+  Limit bytes("thesis scene: bytes of the global map, median", 10'000);
+  Limit drift("thesis scene: drift of a fine mean, m", 0.5001);
+  for (const auto& row : rows("thesis_scene")) {
+    leaves.Offer(row["median_leaves"], "coast");
+    bytes.Offer(row["median_bytes"], "coast");
+    drift.Offer(row["worst_m"], "coast");
+  }
+  missed += leaves.Report() + bytes.Report() + drift.Report();
   return missed;
 }
 

@@ -11,6 +11,7 @@
 
 #include "tests/accuracy/figures.h"
 #include "tests/accuracy/limits.h"
+#include "tests/accuracy/thesis_scene.h"
 
 namespace fathom::accuracy {
 namespace {
@@ -40,6 +41,20 @@ std::vector<Scene> Scenes(const std::string& data) {
                     .cell_m = 10,
                     .cells = 16});
   return scenes;
+}
+
+// The scene of the thesis on a terrain of 10 m: one row.
+nlohmann::json ThesisSceneFigures(const Terrain& terrain) {
+  const ThesisScene scene = MeasureThesisScene(terrain, 200);
+  return nlohmann::json::array(
+      {{{"windows", scene.windows},
+        {"median_leaves", scene.median_leaves},
+        {"median_bytes", scene.median_bytes},
+        {"most_bytes", scene.most_bytes},
+        {"worst_m", scene.worst_m},
+        {"as_printed_median_leaves", scene.pairwise_median_leaves},
+        {"as_printed_worst_m", scene.pairwise_worst_m},
+        {"flat_median_leaves", scene.flat_median_leaves}}});
 }
 
 // One line a row: every scalar of the row.
@@ -91,6 +106,13 @@ int Run(int argc, char** argv) {
            [&] {
              return HazardFigures(data + "/charts", scenes.front().terrain,
                                   seeds);
+           }},
+          {"thesis_scene",
+           [&] {
+             // The first scene is Woods Hole where it lies.
+             return scenes.front().name == "coast"
+                        ? ThesisSceneFigures(scenes.front().terrain)
+                        : nlohmann::json::array();
            }},
           {"recorded",
            [&] {
