@@ -186,6 +186,66 @@ class Limits(LiveTest):
             self.assertEqual(len(server.status().activities), 0)
             self.serves(server)
 
+    def test_cells_along_a_side(self):
+        with self.new_mission() as server:
+            limit = server.status().limits.max_local_side_cells
+            self.assertEqual(limit, 65_536)
+            # 0.1 m cells, two of them the other way.
+            started = start_activity(server, "side", cell_size_m=0.1,
+                                     north_extent_m=limit * 0.1,
+                                     east_extent_m=0.2)
+            self.assertEqual(started.activity.cells_north, limit)
+            for field in ("north_extent_m", "east_extent_m"):
+                extents = dict(north_extent_m=0.2, east_extent_m=0.2)
+                extents[field] = (limit + 1) * 0.1
+                with self.assertRaises(grpc.RpcError) as caught:
+                    start_activity(server, "past", cell_size_m=0.1, **extents)
+                self.assertEqual(caught.exception.code(),
+                                 grpc.StatusCode.INVALID_ARGUMENT)
+                self.assertIn(str(limit), caught.exception.details())
+                self.assertIn(field, caught.exception.details())
+
+    def test_cells_of_smoothing(self):
+        with self.new_mission() as server:
+            limit = server.status().limits.max_smoothing_cells
+            start_activity(server, "at", cell_size_m=10, smoothing_scale=0.5,
+                           smoothing_distance_m=10 * limit)
+            with self.assertRaises(grpc.RpcError) as caught:
+                start_activity(server, "past", cell_size_m=10,
+                               smoothing_scale=0.5,
+                               smoothing_distance_m=10 * limit + 1)
+            self.assertEqual(caught.exception.code(),
+                             grpc.StatusCode.INVALID_ARGUMENT)
+            self.assertIn(str(limit), caught.exception.details())
+
+    def test_every_limit_is_published(self):
+        with self.new_mission() as server:
+            limits = server.status().limits
+            for field in limits.DESCRIPTOR.fields:
+                self.assertGreater(getattr(limits, field.name), 0, field.name)
+
+    def test_refusals_and_degraded_cells_are_counted_across_a_restart(self):
+        with self.new_mission("--max-cells", "1000") as server:
+            tile = mission.DepthTile(
+                north_west=point(1500, -1000), latitude_step_deg=0.0005,
+                longitude_step_deg=0.0005, rows=60, columns=60,
+                depth_m=[10 + i % 7 * 5 for i in range(3600)], std_m=[1])
+            imported = import_chart(server, tile)
+            self.assertGreater(imported.degraded, 0)
+            report_contacts(server, [fix_report(1, second=10),
+                                     fix_report(2, second=5)])
+            before = server.status()
+            self.assertEqual(before.global_map.degraded, imported.degraded)
+            self.assertEqual([(r.reason, r.count)
+                              for r in before.contacts.rejects],
+                             [(types.REJECT_REASON_TOO_LATE, 1)])
+            self.assertEqual(server.terminate(), 0, server.log())
+        with self.reopen() as again:
+            after = again.status()
+            self.assertEqual(after.global_map.degraded, imported.degraded)
+            self.assertEqual(list(after.contacts.rejects),
+                             list(before.contacts.rejects))
+
     def test_bytes_of_a_message(self):
         with self.new_mission() as server:
             limit = server.status().limits.max_message_bytes
