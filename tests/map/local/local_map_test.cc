@@ -264,9 +264,9 @@ TEST(LocalMap, WithoutAnyPriorTheEvidenceStandsAlone) {
     map.Update(PingOn(options, kCell, 33.0f, 0.5f), nullptr);
     const DepthEstimate got = *map.View().AtCell(kCell);
     EXPECT_EQ(got.depth_m, 33.0f);
-    // `adaptive` adds what a cell of 10 m may vary by: a typical 0.0075 m^2 that
-    // is known to a factor (std 0.0122), cut off below 0: 0.0130, once for the
-    // mean and once for the place: sqrt(0.25 + 0.0260) = 0.5253.
+    // `adaptive` adds what a cell of 10 m may vary by: a typical 0.0075 m^2
+    // that is known to a factor (std 0.0122), cut off below 0: 0.0130, once for
+    // the mean and once for the place: sqrt(0.25 + 0.0260) = 0.5253.
     EXPECT_NEAR(got.std_m, kind == EstimatorKind::kAdaptive ? 0.5253f : 0.5f,
                 1e-3f);
     EXPECT_FALSE(map.View().DefaultPrior().has_value());
