@@ -1,8 +1,8 @@
 #include "map/local/local_map_view.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <span>
 #include <utility>
 
 #include "absl/base/macros.h"
@@ -144,43 +144,86 @@ std::optional<DepthEstimate> ReadMeasured(const LocalGrid& grid,
   return ToEstimate(read, EvidenceKind::kMeasured, evidence, cell_size_m);
 }
 
-struct MeasuredList {
-  std::array<MeasuredNear, kMaxMeasuredNear> cells;
-  std::size_t count = 0;
-  std::span<const MeasuredNear> span() const { return {cells.data(), count}; }
-};
-
 // Rings beyond smoothing's reach that still tell how rough the floor is: a
 // variogram from one or two pairs is nearly a guess.
 constexpr std::int32_t kRoughnessRings = 4;
 
-// The measured cells about `cell`, ring by ring outward until there are
-// kMaxMeasuredNear; none if none lies within smoothing's reach.
-MeasuredList MeasuredAround(const LocalGrid& grid,
-                            const BlockDirectory& directory, CellIndex cell) {
-  MeasuredList near;
-  const auto look = [&](std::int32_t north, std::int32_t east) {
-    const CellIndex at = {.i = cell.i + north, .j = cell.j + east};
-    if (near.count == kMaxMeasuredNear || !grid.Contains(at)) return;
-    const Place place = PlaceOf(directory, at);
-    if (place.block == nullptr || !place.block->measured(place.k)) return;
-    near.cells[near.count++] = {.north = north,
-                                .east = east,
-                                .evidence = place.block->AllEvidence(place.k)};
+// Cells in the first `rings` rings about a cell.
+constexpr std::size_t CellsWithin(std::int32_t rings) {
+  const auto side = static_cast<std::size_t>(2 * rings + 1);
+  return side * side - 1;
+}
+
+// The cells about a cell in the order in which they are looked at: ring by ring
+// outward, south and north sides first.
+struct Offset {
+  std::int8_t north = 0;
+  std::int8_t east = 0;
+};
+constexpr std::int32_t kMostRings = kMaxSmoothReach + kRoughnessRings;
+constexpr auto kOutward = [] {
+  std::array<Offset, CellsWithin(kMostRings)> offsets = {};
+  std::size_t next = 0;
+  const auto add = [&](std::int32_t north, std::int32_t east) {
+    offsets[next++] = {.north = static_cast<std::int8_t>(north),
+                       .east = static_cast<std::int8_t>(east)};
   };
-  const auto reach = static_cast<std::int32_t>(grid.reach);
-  for (std::int32_t ring = 1; ring <= reach + kRoughnessRings; ++ring) {
-    if (ring == reach + 1 && near.count == 0) break;
+  for (std::int32_t ring = 1; ring <= kMostRings; ++ring) {
     for (std::int32_t along = -ring; along <= ring; ++along) {
-      look(-ring, along);
-      look(ring, along);
+      add(-ring, along);
+      add(ring, along);
     }
     for (std::int32_t along = 1 - ring; along < ring; ++along) {
-      look(along, -ring);
-      look(along, ring);
+      add(along, -ring);
+      add(along, ring);
+    }
+  }
+  return offsets;
+}();
+
+// The measured cells about `cell`, outward until there are kMaxMeasuredNear;
+// none if none lies within smoothing's reach.
+MeasuredNear MeasuredAround(const LocalGrid& grid,
+                            const BlockDirectory& directory, CellIndex cell) {
+  MeasuredNear near;
+  const auto reach = static_cast<std::int32_t>(grid.reach);
+  const std::size_t within = CellsWithin(reach);
+  const std::size_t most = CellsWithin(reach + kRoughnessRings);
+  for (std::size_t n = 0; n < most && !near.full(); ++n) {
+    if (n == within && near.size == 0) break;
+    const Offset to = kOutward[n];
+    const CellIndex at = {.i = cell.i + to.north, .j = cell.j + to.east};
+    if (!grid.Contains(at)) continue;
+    const Place place = PlaceOf(directory, at);
+    if (place.block == nullptr || !place.block->measured(place.k)) continue;
+    if (place.block->transferred.empty()) {
+      near.Add(to.north, to.east, place.block->evidence[place.k]);
+    } else {
+      near.Add(to.north, to.east, place.block->AllEvidence(place.k));
     }
   }
   return near;
+}
+
+// What the measured cells near it say of a cell, if that is more certain than
+// the prior at `place`. One variable is returned throughout: it is built where
+// the caller wants it.
+std::optional<DepthEstimate> ReadNear(const LocalGrid& grid,
+                                      const BlockDirectory& directory,
+                                      CellIndex cell, const Place& place) {
+  const MeasuredNear near = MeasuredAround(grid, directory, cell);
+  std::optional<DepthEstimate> smoothed = ReadSmoothed(
+      near, grid.options.smoothing_scale, grid.options.cell_size_m);
+  if (!smoothed.has_value() || place.block == nullptr) return smoothed;
+  if (const PendingShoal* shoal = place.block->PendingAt(place.k)) {
+    smoothed->hazard_m = HazardDepth(*shoal);
+  }
+  const CellPrior prior = place.block->prior(place.k);
+  const bool prior_is_better =
+      prior.kind == EvidenceKind::kLand ||
+      (prior.kind != EvidenceKind::kNone && prior.std_m <= smoothed->std_m);
+  if (prior_is_better) smoothed.reset();
+  return smoothed;
 }
 
 // What smoothing wrote (nervegna) or reads (the others) for a cell that was
@@ -199,18 +242,7 @@ std::optional<DepthEstimate> ReadUnmeasured(const LocalGrid& grid,
                       grid.options.cell_size_m);
   }
   if (grid.reach == 0) return std::nullopt;
-  const MeasuredList near = MeasuredAround(grid, directory, cell);
-  std::optional<DepthEstimate> smoothed = ReadSmoothed(
-      near.span(), grid.options.smoothing_scale, grid.options.cell_size_m);
-  if (!smoothed.has_value() || place.block == nullptr) return smoothed;
-  if (const PendingShoal* shoal = place.block->PendingAt(place.k)) {
-    smoothed->hazard_m = HazardDepth(*shoal);
-  }
-  const CellPrior prior = place.block->prior(place.k);
-  const bool prior_is_better =
-      prior.kind == EvidenceKind::kLand ||
-      (prior.kind != EvidenceKind::kNone && prior.std_m <= smoothed->std_m);
-  return prior_is_better ? std::nullopt : smoothed;
+  return ReadNear(grid, directory, cell, place);
 }
 
 }  // namespace
