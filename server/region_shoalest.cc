@@ -54,7 +54,7 @@ IndexRange Touched(double low, double high, uint32_t count) {
 // Whether a reading of the cell may hold something shoaler than `known_m`
 // that its soundings and their mean do not show: a prior that draws the
 // estimate upwards (which lies between both), or a hazard, which begins above
-// its sounding and is told the more readily the less the floor varies.
+// its sounding.
 bool MayHoldShoaler(const map::LocalBlock& block, size_t k,
                     const map::Evidence& evidence, float known_m) {
   const map::CellPrior prior = block.prior(k);
@@ -62,7 +62,7 @@ bool MayHoldShoaler(const map::LocalBlock& block, size_t k,
       prior.kind != map::EvidenceKind::kLand && prior.depth_m < known_m) {
     return true;
   }
-  return map::HazardDepth(evidence, /*variability_m2=*/0) < known_m;
+  return map::HazardDepth(evidence) < known_m;
 }
 
 // The least of what a cell holds, if it is below `known_m`; what is not below

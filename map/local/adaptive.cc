@@ -213,8 +213,7 @@ AdaptiveReading ReadAdaptive(const Neighbourhood& cells, const CellPrior& prior,
   read.variance_m2 += variability_m2;
   return {.predictive = read,
           .variability_m2 = variability_m2,
-          .hazard_m = HazardDepth(
-              evidence, std::clamp(around.variance_m2, 0.0, variability_m2))};
+          .hazard_m = HazardDepth(evidence)};
 }
 
 }  // namespace fathom::map

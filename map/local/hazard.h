@@ -3,9 +3,10 @@
 // A cell's mean and std describe its floor; a rock hit once in a hundred
 // soundings is averaged away by them (charted rocks read 0.8 to 4 m too deep in
 // gridded means). So the cell also keeps its shoalest credible sounding, and
-// a reading tells it as a hazard where neither stated noise nor the slope of
-// the surroundings explains it. An answer is never FREE at a hazard's depth
-// or below (map/query/obstacle_query.h).
+// a reading tells it as a hazard where stated noise does not explain it. A
+// slope is no excuse: the shoal side of a steep cell is as solid as a rock. An
+// answer is never FREE at a hazard's depth or below
+// (map/query/obstacle_query.h).
 //
 // Of one sounding that stands far above all around it two things may be true:
 // a new shoal, or a gross error (0.55 m beside 90 m: a fish, a dropout). It is
@@ -59,24 +60,31 @@ inline bool IsGrossShoal(float depth_m, float reference_m) {
 // credible and within 2 m or three stated std of both.
 bool Confirms(const PendingShoal& pending, float depth_m, float std_m);
 
+// How far above a sounding its hazard begins, in stated std: noise sinks a
+// rock farther than that in one hit of 290 000 (4: of 32 000, and a chart of
+// 256 rocks surveyed 123 times loses one).
+inline constexpr float kHazardMarginStd = 4.5f;
+
 // The hazard_m of a reading (see DepthEstimate), or NaN.
 //
-// Let z_s be the shoalest credible sounding, mean' and n - 1 the others, s the
-// typical stated std. z_s is no chance if
-//   (mean' - z_s)^2 > (q_n^2 s^2 + 1.5^2 tau_r^2) n / (n - 1),
+// Let z_s be the shoalest credible sounding, mean' that of the n - 1 others, s
+// the typical stated std. z_s is no chance if
+//   mean' - z_s > q_n s,
 // q_n the bound that the least of n normal draws passes once in a hundred
-// cells (Bonferroni), tau_r^2 the lesser of what the cell and what the
-// surroundings vary by: alone, the cell's own scatter would let two hits on a
-// rock excuse each other, and a steep region one in a flat place. The hazard
-// then begins 4 s above z_s, so that noise does not sink it.
+// cells (Bonferroni). That mean' is itself uncertain by s / sqrt(n - 1) is
+// left out, in favour of the hazard: of few soundings the others may be wrong
+// too. So cells without one have a hazard once in 25 (n = 3), 57 (10), 79
+// (100). Neither the cell's own scatter nor the slope around it is asked: two
+// hits on a rock would excuse each other. The hazard then begins
+// kHazardMarginStd s above z_s, so that noise does not sink it. Cells of one
+// or two soundings always have one: all of them may be on the rock.
 //
-// `variability_m2`: tau_r^2 >= 0. A cell of one sounding has no others and no
-// hazard: its std speaks for it.
-float HazardDepth(const Evidence& evidence, double variability_m2);
+// NaN for a cell that is empty or holds no credible sounding.
+float HazardDepth(const Evidence& evidence);
 
-// Where a held-back sounding makes a hazard begin: 4 std above it.
+// Where a held-back sounding makes a hazard begin.
 inline float HazardDepth(const PendingShoal& pending) {
-  return pending.depth_m - 4.0f * pending.std_m;
+  return pending.depth_m - kHazardMarginStd * pending.std_m;
 }
 
 }  // namespace fathom::map

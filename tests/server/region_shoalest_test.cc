@@ -174,9 +174,9 @@ TEST(RegionShoalest, ASpikeBetweenTheCentresOfACoarseAnswerIsTold) {
   ASSERT_EQ(region.Next(kNever, &response), Region::Step::kBlock);
   ASSERT_EQ(response.tile().depth_m_size(), 1);
   // The chart says 20 m at the centre, the sounding 4 m elsewhere; alone it is
-  // a hazard from four of its stds above: 4 - 4 * 0.2.
+  // a hazard from 4.5 of its stds above: 4 - 4.5 * 0.2.
   EXPECT_FLOAT_EQ(response.tile().depth_m(0), 20);
-  EXPECT_FLOAT_EQ(response.tile().shoalest_m(0), 3.2F);
+  EXPECT_FLOAT_EQ(response.tile().shoalest_m(0), 3.1F);
   EXPECT_EQ(response.tile().layer()[0], v1::MAP_LAYER_GLOBAL);
 }
 

@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <initializer_list>
 #include <random>
+#include <utility>
 
 #include "map/local/local_grid.h"
 #include "tests/map/local/local_test_map.h"
@@ -23,23 +25,48 @@ LocalMapOptions Options(EstimatorKind kind = EstimatorKind::kAdaptive) {
   return options;
 }
 
-TEST(HazardDepth, IsFourStdAboveARockThatNoiseDoesNotExplain) {
-  // Nine soundings at 20 m and one at 18 m, 0.1 m each: mean 19.8, the others
-  // 2 m deeper. q_10 = sqrt(2 ln 500) - 0.45 = 3.0755: explained are
-  // 3.0755 * 0.1 * sqrt(10 / 9) = 0.324 m.
+Evidence Soundings(std::initializer_list<float> depths_m, float std_m) {
   Evidence evidence;
-  for (int n = 0; n < 9; ++n) evidence.Add(20.0f, 0.1f, 1);
-  evidence.Add(18.0f, 0.1f, 1);
-  EXPECT_NEAR(HazardDepth(evidence, 0.0), 17.6f, 1e-4);
-  // A slope that varies by 1.6 m (std) explains it: 1.3 * 1.6 = 2.08 m times
-  // sqrt(10 / 9).
-  EXPECT_TRUE(std::isnan(HazardDepth(evidence, 1.6 * 1.6)));
+  for (const float depth_m : depths_m) evidence.Add(depth_m, std_m, 1);
+  return evidence;
 }
 
-TEST(HazardDepth, ConsistentSoundingsAreNoneOnceInAHundredCells) {
+TEST(HazardDepth, IsFourAndAHalfStdAboveARockThatNoiseDoesNotExplain) {
+  // Nine soundings at 20 m and one at 18 m, 0.1 m each: the others are 2 m
+  // deeper, and noise explains q_10 = sqrt(2 ln 500) - 0.45 = 3.0755 times
+  // 0.1 m. The hazard: 18 - 4.5 * 0.1.
+  EXPECT_NEAR(
+      HazardDepth(Soundings({20, 20, 20, 20, 20, 20, 20, 20, 20, 18}, 0.1f)),
+      17.55f, 1e-4);
+}
+
+TEST(HazardDepth, TheShoalSideOfASlopeIsOneToo) {
+  // The others' mean is (19 + 20 + 21 + 22) / 4 = 20.5, 2.5 m deeper; noise
+  // explains q_5 = sqrt(2 ln 250) - 0.45 = 2.873 times 0.1 m.
+  EXPECT_NEAR(HazardDepth(Soundings({18, 19, 20, 21, 22}, 0.1f)), 17.55f, 1e-4);
+}
+
+// A rock at 0.15 m that was read at 0.411 m (2.6 std too deep) between two
+// soundings of the floor: q_3 = sqrt(2 ln 150) - 0.45 = 2.7156.
+TEST(HazardDepth, OfThreeSoundingsTheOthersMayBeWrongToo) {
+  // The others' mean is (0.681 + 0.786) / 2 = 0.7335, 0.3225 m deeper, more
+  // than 0.27156 m. 0.411 - 0.45 = -0.039, above the rock.
+  EXPECT_NEAR(HazardDepth(Soundings({0.681f, 0.411f, 0.786f}, 0.1f)), -0.039f,
+              1e-4);
+  // 0.7335 - 0.464 = 0.2695 m is explained, 0.7335 - 0.460 = 0.2735 m is not.
+  EXPECT_TRUE(
+      std::isnan(HazardDepth(Soundings({0.681f, 0.464f, 0.786f}, 0.1f))));
+  EXPECT_NEAR(HazardDepth(Soundings({0.681f, 0.460f, 0.786f}, 0.1f)), 0.010f,
+              1e-4);
+}
+
+TEST(HazardDepth, ConsistentSoundingsRarelyMakeOne) {
+  // n (1 - Phi(q_n sqrt((n - 1) / n))): 3 (1 - Phi(2.2173)) = 3.99 %,
+  // 10 (1 - Phi(2.9177)) = 1.76 %, 100 (1 - Phi(3.6588)) = 1.27 %.
   std::mt19937_64 random(5);
   std::normal_distribution<float> noise(0.0f, 0.3f);
-  for (const int hits : {3, 10, 100}) {
+  for (const auto& [hits, share] :
+       {std::pair(3, 0.0399), std::pair(10, 0.0176), std::pair(100, 0.0127)}) {
     int hazards = 0;
     constexpr int kCells = 4000;
     for (int cell = 0; cell < kCells; ++cell) {
@@ -47,18 +74,18 @@ TEST(HazardDepth, ConsistentSoundingsAreNoneOnceInAHundredCells) {
       for (int n = 0; n < hits; ++n) {
         evidence.Add(20.0f + noise(random), 0.3f, 1);
       }
-      hazards += !std::isnan(HazardDepth(evidence, 0.0));
+      hazards += !std::isnan(HazardDepth(evidence));
     }
-    // 1 % is 40; 7 is its std.
-    EXPECT_LT(hazards, 0.02 * kCells) << hits;
+    // Three std of a count.
+    EXPECT_NEAR(hazards, share * kCells, 3 * std::sqrt(share * kCells)) << hits;
   }
 }
 
 TEST(HazardDepth, FewerThanThreeSoundingsMayBothBeOnARock) {
   Evidence evidence;
-  EXPECT_TRUE(std::isnan(HazardDepth(evidence, 0.0)));
+  EXPECT_TRUE(std::isnan(HazardDepth(evidence)));
   evidence.Add(20.0f, 0.1f, 1);
-  EXPECT_NEAR(HazardDepth(evidence, 0.0), 19.6f, 1e-4);
+  EXPECT_NEAR(HazardDepth(evidence), 19.55f, 1e-4);
 }
 
 TEST(HazardDepth, SoundingsThatAreNotCredibleMakeNone) {
@@ -66,7 +93,7 @@ TEST(HazardDepth, SoundingsThatAreNotCredibleMakeNone) {
   Evidence evidence;
   for (int n = 0; n < 9; ++n) evidence.Add(20.0f, 0.1f, 1);
   evidence.Add(5.0f, 5.0f, 1);
-  EXPECT_TRUE(std::isnan(HazardDepth(evidence, 0.0)));
+  EXPECT_TRUE(std::isnan(HazardDepth(evidence)));
 }
 
 TEST(IsGrossShoal, TakesMoreThanTenMetresAndHalfOfTheDepth) {
@@ -90,7 +117,7 @@ TEST(Gate, AGrossShoalIsHeldBackCountedAndNotFree) {
   const DepthEstimate got = *map.View().AtCell(kCell);
   EXPECT_NEAR(got.depth_m, 90.0f, 0.1f);
   EXPECT_LT(got.std_m, 1.0f);
-  EXPECT_NEAR(got.hazard_m, 0.55f - 0.4f, 1e-4);
+  EXPECT_NEAR(got.hazard_m, 0.55f - 0.45f, 1e-4);
 }
 
 TEST(Gate, TheSecondCredibleHitOnANewShoalCountsAtOnce) {
@@ -108,7 +135,8 @@ TEST(Gate, TheSecondCredibleHitOnANewShoalCountsAtOnce) {
   // Both are in: 5 at 40 and 4, 4.5: (200 + 8.5) / 7 = 29.79.
   EXPECT_NEAR(got.depth_m, 29.79f, 0.1f);
   EXPECT_EQ(got.shoalest_m, 4.0f);
-  EXPECT_NEAR(got.hazard_m, 3.2f, 1e-3);
+  // The shoaler less 4.5 * 0.2 m.
+  EXPECT_NEAR(got.hazard_m, 3.1f, 1e-3);
   EXPECT_TRUE(view.Block(LocalGrid::BlockOf(kCell))->pending.empty());
 }
 
