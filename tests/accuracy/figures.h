@@ -48,6 +48,11 @@ nlohmann::json BadPriorFigures(const std::vector<Scene>& scenes, int seeds);
 nlohmann::json HazardFigures(const std::string& chart_folder,
                              const Terrain& terrain, int seeds);
 
+// What hazards cost where there is no rock: of the water at depths about the
+// seabed, the share that is answered FREE at 0.95 and the share that would be
+// but for hazard_m; after 1, 3, 10, 100 hits a cell, estimator `adaptive`.
+nlohmann::json HazardCostFigures(const std::vector<Scene>& scenes, int seeds);
+
 // A recorded multibeam survey: odd pings fused, even pings verify.
 nlohmann::json RecordedFigures(const std::string& soundings_csv_gz);
 

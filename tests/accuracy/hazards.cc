@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <limits>
 #include <sstream>
 
 #include "map/contacts/contacts_view.h"
@@ -63,6 +64,80 @@ std::vector<ChartedHazard> ReadHazards(const std::string& folder,
     hazards.push_back(hazard);
   }
   return hazards;
+}
+
+// What hazards cost in one survey without rocks: counts of cells, and of
+// questions about water at depths about the seabed.
+struct Cost {
+  int cells = 0;
+  int with_hazard = 0;
+  int water = 0;
+  int free = 0;
+  int lost = 0;  // Free but for the hazard.
+
+  Cost& operator+=(const Cost& other) {
+    cells += other.cells;
+    with_hazard += other.with_hazard;
+    water += other.water;
+    free += other.free;
+    lost += other.lost;
+    return *this;
+  }
+};
+
+bool IsFree(const map::DepthEstimate& estimate, double depth_m) {
+  map::ObstacleQuery query;
+  query.depth_m = depth_m;
+  const map::SeabedEstimate seabed = {.estimate = estimate, .local = true};
+  return map::Answer(query, seabed, map::ContactsView()).state ==
+         map::ObstacleState::kFree;
+}
+
+Cost CostOf(const Scene& scene, int hits, int seed) {
+  constexpr int kQuestionsPerCell = 4;
+  Cost cost;
+  Random random(static_cast<std::uint64_t>(1000 * seed + hits));
+  const auto window =
+      PickWindow(scene.terrain, scene.cell_m, scene.cells, random);
+  if (!window) return cost;
+  const SurveyPlan plan{.std_m = scene.std_m, .hits = hits};
+  map::LocalMap map = MakeSurvey(*window, plan, random);
+  const map::LocalMapView view = map.View();
+  // As ReliabilityFigures asks.
+  std::uniform_real_distribution<double> above_m(-4 * scene.std_m - 0.5,
+                                                 4 * scene.std_m + 0.5);
+  for (int i = 0; i < window->cells; ++i) {
+    for (int j = 0; j < window->cells; ++j) {
+      const auto estimate = view.AtCell({.i = i, .j = j});
+      if (!estimate) continue;
+      map::DepthEstimate plain = *estimate;
+      plain.hazard_m = std::numeric_limits<float>::quiet_NaN();
+      ++cost.cells;
+      cost.with_hazard += !std::isnan(estimate->hazard_m);
+      for (int n = 0; n < kQuestionsPerCell; ++n) {
+        const Place at = RandomPlace(*window, i, j, random);
+        const Place level = RandomPlace(*window, i, j, random);
+        const double depth_m =
+            window->DepthAt(level.north_m, level.east_m).value() +
+            above_m(random);
+        if (window->DepthAt(at.north_m, at.east_m).value() <= depth_m) continue;
+        ++cost.water;
+        if (!IsFree(plain, depth_m)) continue;
+        ++(IsFree(*estimate, depth_m) ? cost.free : cost.lost);
+      }
+    }
+  }
+  return cost;
+}
+
+nlohmann::json ToRow(const std::string& scene, int hits, const Cost& cost) {
+  const double cells = std::max(1, cost.cells);
+  const double water = std::max(1, cost.water);
+  return {{"scene", scene},
+          {"hits", hits},
+          {"cells_with_hazard_percent", 100 * cost.with_hazard / cells},
+          {"water_free_percent", 100 * cost.free / water},
+          {"free_lost_to_hazards_percent", 100 * cost.lost / water}};
 }
 
 }  // namespace
@@ -141,6 +216,26 @@ nlohmann::json HazardFigures(const std::string& chart_folder,
                     {"unknown", states[3]},
                     {"clean_cells_free_1m_above_percent",
                      100.0 * clean_free / std::max(1, clean)}});
+  }
+  return rows;
+}
+
+nlohmann::json HazardCostFigures(const std::vector<Scene>& scenes, int seeds) {
+  constexpr std::array kHits = {1, 3, 10, 100};
+  auto rows = nlohmann::json::array();
+  std::array<Cost, kHits.size()> all;
+  for (const Scene& scene : scenes) {
+    for (std::size_t h = 0; h < kHits.size(); ++h) {
+      Cost cost;
+      for (int seed = 1; seed <= seeds; ++seed) {
+        cost += CostOf(scene, kHits[h], seed);
+      }
+      rows.push_back(ToRow(scene.name, kHits[h], cost));
+      all[h] += cost;
+    }
+  }
+  for (std::size_t h = 0; h < kHits.size(); ++h) {
+    rows.push_back(ToRow("all", kHits[h], all[h]));
   }
   return rows;
 }

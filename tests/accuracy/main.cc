@@ -107,6 +107,7 @@ int Run(int argc, char** argv) {
              return HazardFigures(data + "/charts", scenes.front().terrain,
                                   seeds);
            }},
+          {"hazard_cost", [&] { return HazardCostFigures(scenes, seeds); }},
           {"thesis_scene",
            [&] {
              // The first scene is Woods Hole where it lies.
