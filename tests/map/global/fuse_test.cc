@@ -7,6 +7,8 @@
 #include <cstdio>
 #include <cstdlib>
 #include <random>
+#include <span>
+#include <vector>
 
 namespace fathom::map {
 namespace {
@@ -131,6 +133,157 @@ TEST(EvidenceSum, PartsThatDifferAreVariability) {
   EXPECT_EQ(joined.soundings, 7u);
   EXPECT_EQ(joined.hazard_m, 2);
 }
+
+TEST(EvidenceSum, AShoalThatFillsAPartIsAHazard) {
+  // Nine parts, one 4 m above the others: d = 4 - 4/9 = 3.556 from the mean
+  // 19.556; the means' variance is 16 * 1/9 * 8/9 = 1.580, 1.6 of its std 2.01.
+  EvidenceSum sum;
+  for (int i = 0; i < 8; ++i) sum.Add({.mean_m = 20, .variance_m2 = 0.01});
+  sum.Add({.mean_m = 16, .variance_m2 = 0.01, .variability_m2 = 0.03});
+  const CellEvidence joined = sum.Join(1.0);
+  EXPECT_NEAR(joined.mean_m, 19.5556, 1e-4);
+  EXPECT_NEAR(joined.variability_m2, 1.580 + 0.03 / 9, 1e-3);
+  // Its own answer ceases to be FREE at 16 - 1.645 sqrt(0.04) = 15.671.
+  EXPECT_NEAR(joined.hazard_m, 15.671, 1e-4);
+}
+
+TEST(EvidenceSum, ChanceAndSlopeMakeNoHazard) {
+  // Noise of 0.3 m alone: the least of 81 lies 2.4 sigma up on the average.
+  std::mt19937 random(3);
+  std::normal_distribution<double> noise(0, 0.3);
+  int hazards = 0;
+  for (int cell = 0; cell < 2000; ++cell) {
+    EvidenceSum sum;
+    for (int i = 0; i < 81; ++i) {
+      sum.Add({.mean_m = 20 + noise(random), .variance_m2 = 0.09});
+    }
+    hazards += sum.Join(1.0).hazard_m != kNoHazard;
+  }
+  // Once in a hundred cells, less by what the means' variance takes.
+  EXPECT_LE(hazards, 20);
+  // A slope along one axis: its end is 4 / sqrt(60 / 9) = 1.55 std up.
+  EvidenceSum slope;
+  for (int i = 0; i < 81; ++i) {
+    slope.Add({.mean_m = 20 + 1.0 * (i % 9), .variance_m2 = 1e-4});
+  }
+  EXPECT_EQ(slope.Join(1.0).hazard_m, kNoHazard);
+}
+
+// ---- A prior counts once ----
+
+// A prior and the soundings of one cell, which agree (within 0.7 sigma of the
+// prior's and 1 sigma of theirs): then nothing is widened.
+struct Case {
+  CellEvidence prior;
+  std::vector<CellEvidence> soundings;
+};
+
+Case RandomCase(std::mt19937& random, int soundings) {
+  std::uniform_real_distribution<double> unit(0, 1);
+  const double depth_m = 5 + 60 * unit(random);
+  const double prior_std_m = 2 + 8 * unit(random);
+  Case one{
+      .prior = {.mean_m = depth_m + prior_std_m * 0.7 * (2 * unit(random) - 1),
+                .variance_m2 = prior_std_m * prior_std_m},
+      .soundings = {}};
+  for (int i = 0; i < soundings; ++i) {
+    const double std_m = 0.05 + 0.45 * unit(random);
+    one.soundings.push_back({.mean_m = depth_m + std_m * (2 * unit(random) - 1),
+                             .variance_m2 = std_m * std_m,
+                             .soundings = 1});
+  }
+  return one;
+}
+
+// The weighted mean of `parts`: what a local map keeps between transfers, and
+// the batch solution.
+CellEvidence Batch(std::span<const CellEvidence> parts) {
+  double weight = 0;
+  double mean_m = 0;
+  for (const CellEvidence& part : parts) {
+    weight += 1 / part.variance_m2;
+    mean_m += part.mean_m / part.variance_m2;
+  }
+  return {.mean_m = mean_m / weight,
+          .variance_m2 = 1 / weight,
+          .soundings = static_cast<std::uint32_t>(parts.size())};
+}
+
+constexpr int kSoundings = 24;
+
+class Transfers : public ::testing::TestWithParam<int> {
+ protected:
+  // The soundings in GetParam() shares, one transfer each.
+  static std::vector<CellEvidence> Shares(const Case& one) {
+    const std::size_t size = one.soundings.size() / GetParam();
+    std::vector<CellEvidence> shares;
+    for (std::size_t begin = 0; begin < one.soundings.size(); begin += size) {
+      shares.push_back(Batch(std::span(one.soundings).subspan(begin, size)));
+    }
+    return shares;
+  }
+  static CellEvidence All(const Case& one) {
+    std::vector<CellEvidence> all = one.soundings;
+    all.push_back(one.prior);
+    return Batch(all);
+  }
+};
+
+TEST_P(Transfers, GiveTheBatchSolution) {
+  std::mt19937 random(17);
+  for (int trial = 0; trial < 2000; ++trial) {
+    const Case one = RandomCase(random, kSoundings);
+    const std::vector<CellEvidence> shares = Shares(one);
+    ASSERT_EQ(shares.size(), static_cast<std::size_t>(GetParam()));
+    CellEvidence held = FuseWithPrior(one.prior, shares[0]);
+    for (std::size_t i = 1; i < shares.size(); ++i) {
+      held = FuseEvidence(held, shares[i]);
+    }
+    const CellEvidence all = All(one);
+    ASSERT_NEAR(held.mean_m / all.mean_m, 1, 1e-6);
+    ASSERT_NEAR(held.variance_m2 / all.variance_m2, 1, 1e-6);
+  }
+}
+
+// The same in a leaf. Its std is rounded by up to 2^-10 of itself at each
+// transfer, and so is that of later evidence. In a harmonic mean relative
+// errors are averaged: k transfers err by at most (k + 1) 2^-10. An error e of
+// the ratio of the stds moves a fused mean by 2 e g (1 - g) of the distance, g
+// the gain, of which the next fusion keeps 1 - g.
+TEST_P(Transfers, GiveTheBatchSolutionWithinTheCodesInALeaf) {
+  std::mt19937 random(18);
+  double worst_mean_m = 0;
+  double worst_std = 0;
+  for (int trial = 0; trial < 2000; ++trial) {
+    const Case one = RandomCase(random, kSoundings);
+    Leaf leaf = MakeLeaf(LeafKind::kPrior, one.prior);
+    double bound_m = 4e-6;  // Depths are floats below 128 m.
+    int transfers = 0;
+    for (const CellEvidence& share : Shares(one)) {
+      const CellEvidence held = EvidenceOf(leaf);
+      const double gain =
+          held.variance_m2 / (held.variance_m2 + share.variance_m2);
+      ++transfers;
+      bound_m = (1 - gain) * bound_m + 4e-6 +
+                1.02 * 2 * (transfers + 1) * 0x1p-10 * gain * (1 - gain) *
+                    std::abs(share.mean_m - held.mean_m);
+      FuseLeaf(share, LeafKind::kMeasured, leaf);
+    }
+    const CellEvidence all = All(one);
+    const double off_m = std::abs(leaf.depth_m - all.mean_m);
+    const double off_std =
+        std::abs(leaf.mean_std_m() / std::sqrt(all.variance_m2) - 1);
+    ASSERT_LE(off_m, bound_m);
+    ASSERT_LE(off_std, (transfers + 1) * 0x1.02p-10);
+    worst_mean_m = std::max(worst_mean_m, off_m);
+    worst_std = std::max(worst_std, off_std);
+  }
+  std::printf("%d transfers: mean off by up to %.3f mm, std by %.2f %%\n",
+              GetParam(), 1000 * worst_mean_m, 100 * worst_std);
+}
+
+INSTANTIATE_TEST_SUITE_P(OneToAll, Transfers,
+                         ::testing::Values(1, 2, 3, 6, kSoundings));
 
 // ---- Order ----
 
