@@ -25,6 +25,11 @@ int ResidualCodeFor(double distance_m, float tolerance_m) {
   return code;
 }
 
+// The depth from which upward the leaf's answers are FREE.
+double FreeAboveM(const Leaf& leaf) {
+  return leaf.depth_m - kFreeSigmas * leaf.std_m();
+}
+
 std::optional<Leaf> JoinByRange(const std::array<Leaf, 4>& four,
                                 float tolerance_m) {
   double low = four[0].depth_m;
@@ -36,10 +41,9 @@ std::optional<Leaf> JoinByRange(const std::array<Leaf, 4>& four,
   }
   Leaf joined;
   joined.depth_m = static_cast<float>(0.5 * (low + high));
-  const int code = ResidualCodeFor(
+  int code = ResidualCodeFor(
       std::max(high - joined.depth_m, joined.depth_m - low), tolerance_m);
   if (code > 255) return std::nullopt;
-  joined.residual_code = static_cast<std::uint8_t>(code);
   CellEvidence moments;
   for (const Leaf& leaf : four) {
     const CellEvidence part = EvidenceOf(leaf);
@@ -53,6 +57,15 @@ std::optional<Leaf> JoinByRange(const std::array<Leaf, 4>& four,
   const Leaf coded = MakeLeaf(four[0].kind(), moments);
   joined.std_code = coded.std_code;
   joined.spread_code = coded.spread_code;
+  // Nor may answers be FREE deeper than that: a part of a large std beside
+  // surer ones is a shoal that their common std would not tell of.
+  for (const Leaf& leaf : four) {
+    const double deeper_m = FreeAboveM(joined) - FreeAboveM(leaf) +
+                            DecodeResidualM(leaf.residual_code, tolerance_m);
+    code = std::max(code, ResidualCodeFor(deeper_m, tolerance_m));
+  }
+  if (code > 255) return std::nullopt;
+  joined.residual_code = static_cast<std::uint8_t>(code);
   return joined;
 }
 

@@ -10,6 +10,10 @@
 
 namespace fathom::map {
 
+// An answer at the confidence of 0.95 is FREE from this many std above a mean
+// (map/query/obstacle_query.h).
+inline constexpr double kFreeSigmas = 1.645;
+
 // Independent knowledge about the depth of one cell. Land says nothing else.
 struct CellEvidence {
   double mean_m = 0;
@@ -27,6 +31,14 @@ struct CellEvidence {
 // variability is the mean of the parts' own and the variance of their means
 // (they are parts of the cell, not repeated looks at it); all their soundings,
 // the shoalest hazard, the newest time.
+//
+// A shoal that fills a part must not be averaged away: where an answer from the
+// joined normal could be FREE at the shoalest part's mean and chance does not
+// explain it, that part becomes a hazard from where its own answer would cease
+// to be FREE. With d its distance from the joined mean, v the variance of its
+// mean and w that of the parts' means about the joined one, not explained is
+// d^2 > q_n^2 v + 1.6^2 w, q_n the bound that the least of n normal draws
+// passes once in a hundred cells (map/local/hazard.h).
 class EvidenceSum {
  public:
   void Add(const CellEvidence& evidence);
@@ -45,6 +57,8 @@ class EvidenceSum {
   double sum_variabilities_ = 0;
   std::uint64_t soundings_ = 0;
   float hazard_m_ = kNoHazard;
+  // The part with the least mean.
+  CellEvidence shoalest_;
   std::uint32_t time_s_ = 0;
 };
 

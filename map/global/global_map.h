@@ -72,7 +72,8 @@ enum class MergeRule {
   // Four sibling leaves of one kind become one if every fine mean that they
   // stand for lies within tolerance_m of the middle of their range, which
   // becomes the mean. Std by moments about it: mean variance plus mean squared
-  // distance. The default: fewer leaves and a bound (invariant 4).
+  // distance; and only if no answer becomes FREE more than tolerance_m deeper
+  // than the part's was. The default: fewer leaves and a bound (invariant 4).
   kRange,
   // Fig. 4-18 as printed: four siblings whose means agree pairwise within
   // tolerance_m become one with the average mean and the average std. The
@@ -140,9 +141,10 @@ class GlobalMap {
   // none out, so an area may be cut into blocks in any way.
   //
   // Where max_level bounds the level, a cell is larger than `cell_size_m`: the
-  // source is then asked at a grid of points over the cell, one per local cell
-  // (at most kMaxSamplesPerSide squared), and the answers count as one
-  // evidence by moments. Blocks should be no smaller than a global cell.
+  // source is then asked at a grid of points over the cell, so close that no
+  // local cell is missed (at most kMaxSamplesPerSide squared), and the answers
+  // count as one evidence by moments, with a hazard where one of them is a
+  // shoal (map/global/fuse.h). Blocks should be no smaller than a global cell.
   //
   // Only answers of kind kMeasured with a finite depth and std > 0 count.
   // Cells outside the root square are left out. REQUIRES: cell_size_m > 0.
@@ -194,9 +196,10 @@ class GlobalMap {
   // empty. OK without any tile: an empty map.
   absl::Status FinishRestore();
 
-  // Samples along a side of a cell that is larger than the local ones: 256
-  // samples settle a mean; more would let a 0.1 m map stall the transfer.
-  static constexpr int kMaxSamplesPerSide = 16;
+  // Samples along a side of a cell that is larger than the local ones. Local
+  // cells of less than 1/32 of a global one are not all asked: they would let a
+  // 0.1 m map stall the transfer.
+  static constexpr int kMaxSamplesPerSide = 32;
 
  private:
   GlobalMapOptions options_;

@@ -15,7 +15,8 @@
 //   0: 1, no variability is known. So a fusion weighs with a precise weight,
 //   and the answer's std is right to 0.9 %.
 // residual_code, 8 bits: how far, at most, any fine mean that this leaf
-//   replaced lies from depth_m, in 1/255 of the map's tolerance, rounded up.
+//   replaced lies from depth_m, and how much deeper than that leaf's its
+//   answers may be free; in 1/255 of the map's tolerance, rounded up.
 // hazard_m, a float as it came (DepthEstimate::hazard_m); +infinity: none.
 //
 // Pure functions and plain values; thread-safe.

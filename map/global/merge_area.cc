@@ -126,6 +126,19 @@ class TransferRule final : public CellRule {
   std::uint64_t ignored_ = 0;
 };
 
+// How close samples must lie to miss no local cell, in a global cell of `ratio`
+// local ones: a local cell of side 1 that is turned by t against the grid of
+// samples holds one if their distance is at most 1 / (cos t + sin t).
+int SamplesPerSide(double ratio, const std::array<SquarePoint, 4>& corners) {
+  // A twentieth of a cell more is no reason for four times the samples.
+  if (ratio <= 1.05) return 1;
+  const double side_u = std::abs(corners[1].u - corners[0].u);
+  const double side_v = std::abs(corners[1].v - corners[0].v);
+  const double turned = (side_u + side_v) / std::hypot(side_u, side_v);
+  return static_cast<int>(std::clamp(std::ceil(ratio * turned - 0.01), 1.0,
+                                     double{GlobalMap::kMaxSamplesPerSide}));
+}
+
 }  // namespace
 
 GlobalMap::WriteSummary GlobalMap::MergeArea(
@@ -151,10 +164,8 @@ GlobalMap::WriteSummary GlobalMap::MergeArea(
     return static_cast<std::uint32_t>(
         std::clamp(std::floor(fraction * cells), 0.0, cells - 1));
   };
-  // A twentieth of a cell more is no reason for four times the samples.
-  const int samples = static_cast<int>(
-      std::clamp(std::ceil(root.cell_size_m(level) / cell_size_m - 0.05), 1.0,
-                 double{kMaxSamplesPerSide}));
+  const int samples =
+      SamplesPerSide(root.cell_size_m(level) / cell_size_m, places);
 
   const Quadrilateral area(places);
   TransferRule rule(area, source);

@@ -82,6 +82,24 @@ TEST(JoinByRange, StopsWhereAMeanWouldLieBeyondTheTolerance) {
       JoinFour(Four(10, 10.5f, 11.01f, 10.5f), MergeRule::kRange, kTolerance));
 }
 
+TEST(JoinByRange, StopsWhereAnAnswerWouldBeFreeFartherDown) {
+  // 19 +- 2 is FREE from 19 - 1.645 * 2 = 15.71 upward. Joined with three of 20
+  // +- 0.1: mean 19.5, variance (0.25 + 4 + 3 * (0.25 + 0.01)) / 4 = 1.2575,
+  // FREE from 19.5 - 1.645 * 1.1214 = 17.66: 1.9 m deeper.
+  auto four = Four(20, 20, 20, 19);
+  for (Leaf& leaf : four) leaf = LeafOf(leaf.depth_m, 0.1f);
+  EXPECT_TRUE(JoinFour(four, MergeRule::kRange, kTolerance));
+  four[3] = LeafOf(19, 2.0f);
+  EXPECT_FALSE(JoinFour(four, MergeRule::kRange, kTolerance));
+  // 0.2 beside three of 0.1, all 20 m deep: variance 0.0175, FREE from 20 -
+  // 1.645 * 0.1323 = 19.782 in place of 19.671: 0.111 m of the 0.5 are spent.
+  for (Leaf& leaf : four) leaf = LeafOf(20, 0.1f);
+  four[3] = LeafOf(20, 0.2f);
+  const auto joined = JoinFour(four, MergeRule::kRange, kTolerance);
+  ASSERT_TRUE(joined);
+  EXPECT_NEAR(DecodeResidualM(joined->residual_code, kTolerance), 0.111, 0.003);
+}
+
 TEST(JoinByRange, RemembersWhatWasJoinedBefore) {
   auto four = Four(10, 10, 10, 10);
   four[0].residual_code = 255;  // Stands for 9.5 to 10.5.
