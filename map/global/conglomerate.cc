@@ -34,10 +34,12 @@ std::optional<Leaf> JoinByRange(const std::array<Leaf, 4>& four,
                                 float tolerance_m) {
   double low = four[0].depth_m;
   double high = four[0].depth_m;
+  double free_above_m = low;
   for (const Leaf& leaf : four) {
     const double residual_m = DecodeResidualM(leaf.residual_code, tolerance_m);
     low = std::min(low, leaf.depth_m - residual_m);
     high = std::max(high, leaf.depth_m + residual_m);
+    free_above_m = std::min(free_above_m, FreeAboveM(leaf) - residual_m);
   }
   Leaf joined;
   joined.depth_m = static_cast<float>(0.5 * (low + high));
@@ -59,10 +61,10 @@ std::optional<Leaf> JoinByRange(const std::array<Leaf, 4>& four,
   joined.spread_code = coded.spread_code;
   // Nor may answers be FREE deeper than that: a part of a large std beside
   // surer ones is a shoal that their common std would not tell of.
-  for (const Leaf& leaf : four) {
-    const double deeper_m = FreeAboveM(joined) - FreeAboveM(leaf) +
-                            DecodeResidualM(leaf.residual_code, tolerance_m);
-    code = std::max(code, ResidualCodeFor(deeper_m, tolerance_m));
+  const double deeper_m = FreeAboveM(joined) - free_above_m;
+  if (deeper_m >
+      DecodeResidualM(static_cast<std::uint8_t>(code), tolerance_m)) {
+    code = ResidualCodeFor(deeper_m, tolerance_m);
   }
   if (code > 255) return std::nullopt;
   joined.residual_code = static_cast<std::uint8_t>(code);

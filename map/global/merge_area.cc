@@ -63,6 +63,9 @@ class TransferRule final : public CellRule {
       const SquarePoint& center, std::span<const Vector3> row_planes,
       std::span<const Vector3> col_planes) override {
     if (!area_.Contains(center)) return std::nullopt;
+    if (row_planes.size() == 1) {
+      return Ask(ToGeodetic(RootSquare::Meet(row_planes[0], col_planes[0])));
+    }
     EvidenceSum sum;
     for (const Vector3& row : row_planes) {
       for (const Vector3& col : col_planes) {
