@@ -20,6 +20,13 @@ double LeastOfNormals(double n) {
   return std::sqrt(2.0 * std::log(50.0 * n)) - 0.45;
 }
 
+// The depth from which downward an answer from this alone is not FREE.
+float NotFreeFrom(const CellEvidence& part) {
+  return static_cast<float>(
+      part.mean_m -
+      kFreeSigmas * std::sqrt(part.variance_m2 + part.variability_m2));
+}
+
 // Where the hazard of the shoalest of n parts begins; kNoHazard if the joined
 // normal tells of it. `between_m2`: the variance of the parts' means.
 float HazardOfPart(const CellEvidence& part, double joined_mean_m,
@@ -32,9 +39,7 @@ float HazardOfPart(const CellEvidence& part, double joined_mean_m,
   if (above_m * above_m <= bound * bound * part.variance_m2 + told_m2) {
     return kNoHazard;
   }
-  return static_cast<float>(
-      part.mean_m -
-      kFreeSigmas * std::sqrt(part.variance_m2 + part.variability_m2));
+  return NotFreeFrom(part);
 }
 
 // The codes of a mean's variance and a variability.
@@ -95,6 +100,12 @@ CellEvidence EvidenceSum::Join(double land_share) const {
   joined.hazard_m = std::min(
       hazard_m_, HazardOfPart(shoalest_, joined.mean_m, between_m2, n));
   return joined;
+}
+
+CellEvidence EvidenceSum::Shoalest() const {
+  CellEvidence part = shoalest_;
+  part.hazard_m = hazard_m_;
+  return part;
 }
 
 CellEvidence FuseEvidence(const CellEvidence& one, const CellEvidence& other) {
@@ -172,6 +183,16 @@ void FuseLeaf(const CellEvidence& evidence, LeafKind kind, Leaf& leaf) {
                 : FuseEvidence(held, EvidenceOf(MakeLeaf(kind, evidence))));
   leaf.residual_code =
       static_cast<std::uint8_t>(std::ceil(kept * residual_code));
+}
+
+bool AddShoal(const CellEvidence& part, Leaf& leaf) {
+  float hazard_m = part.hazard_m;
+  if (part.mean_m < leaf.depth_m - kFreeSigmas * leaf.std_m()) {
+    hazard_m = std::min(hazard_m, NotFreeFrom(part));
+  }
+  if (hazard_m >= std::min(leaf.hazard_m, leaf.depth_m)) return false;
+  leaf.hazard_m = hazard_m;
+  return true;
 }
 
 Leaf DividedLeaf(const Leaf& leaf) {

@@ -46,6 +46,9 @@ class EvidenceSum {
   // Land if at least `land_share` of what was added was land.
   // REQUIRES: !empty().
   CellEvidence Join(double land_share) const;
+  // The part with the least mean, with the shoalest hazard of all.
+  // REQUIRES: something that is no land was added.
+  CellEvidence Shoalest() const;
 
  private:
   std::uint32_t count_ = 0;
@@ -57,8 +60,7 @@ class EvidenceSum {
   double sum_variabilities_ = 0;
   std::uint64_t soundings_ = 0;
   float hazard_m_ = kNoHazard;
-  // The part with the least mean.
-  CellEvidence shoalest_;
+  CellEvidence shoalest_;  // The part with the least mean.
   std::uint32_t time_s_ = 0;
 };
 
@@ -103,6 +105,11 @@ CellEvidence EvidenceOf(const Leaf& leaf);
 // leaves a code step (tests/map/global/fuse_test.cc measures it and says why
 // 12 bytes cannot do better).
 void FuseLeaf(const CellEvidence& evidence, LeafKind kind, Leaf& leaf);
+
+// A part of the leaf's cell was found to be so shoal: where the leaf's answers
+// would be FREE at its mean, or it has a hazard, the leaf takes it as a hazard.
+// False if nothing changed. REQUIRES: as FuseLeaf.
+bool AddShoal(const CellEvidence& part, Leaf& leaf);
 
 // What a quarter of the leaf's cell inherits: its mean lies off the leaf's by
 // the variability of the leaf, of which a plane keeps a quarter in each part

@@ -152,6 +152,14 @@ class GlobalMap {
   WriteSummary MergeArea(const std::array<GeodeticPoint, 4>& corners,
                          double cell_size_m, const CellSource& source);
 
+  // The other half of MergeArea where global cells are larger than local ones:
+  // for areas beside measured ones, with cells that have their middle here and
+  // reach over there. Too little of such a cell was seen for a mean; but if its
+  // leaf is known, and its answers would be FREE at the shoalest of what was
+  // seen, that becomes its hazard. Writes nothing where cells are not larger.
+  WriteSummary MergeShoals(const std::array<GeodeticPoint, 4>& corners,
+                           double cell_size_m, const CellSource& source);
+
   // Loads a block of a chart (section 4.4.3): leaves of kind prior or land, of
   // the coarsest level whose cells are not larger than the chart's (at most
   // max_level; a leaf larger than the chart's cells joins them by moments, and
@@ -202,6 +210,10 @@ class GlobalMap {
   static constexpr int kMaxSamplesPerSide = 32;
 
  private:
+  WriteSummary WriteEvidence(const std::array<GeodeticPoint, 4>& corners,
+                             double cell_size_m, const CellSource& source,
+                             bool shoals_only);
+
   GlobalMapOptions options_;
   std::unique_ptr<WorkTree> tree_;
   std::map<TileKey, RestoredTile> restored_;

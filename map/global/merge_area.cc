@@ -53,11 +53,16 @@ class Quadrilateral {
   std::array<Side, 4> sides_;
 };
 
-// Measurements of one area, fused with what the leaf holds.
+bool HoldsDepth(const Leaf& leaf) {
+  return leaf.kind() == LeafKind::kPrior || leaf.kind() == LeafKind::kMeasured;
+}
+
+// Measurements of one area, fused with what the leaf holds; or their shoals.
 class TransferRule final : public CellRule {
  public:
-  TransferRule(const Quadrilateral& area, const GlobalMap::CellSource& source)
-      : area_(area), source_(source) {}
+  TransferRule(const Quadrilateral& area, const GlobalMap::CellSource& source,
+               bool shoals_only)
+      : area_(area), source_(source), shoals_only_(shoals_only) {}
 
   std::optional<CellEvidence> Sample(
       const SquarePoint& center, std::span<const Vector3> row_planes,
@@ -75,13 +80,16 @@ class TransferRule final : public CellRule {
       }
     }
     if (sum.empty()) return std::nullopt;
-    return sum.Join(1.0);
+    return shoals_only_ ? sum.Shoalest() : sum.Join(1.0);
   }
 
-  bool MayDivide(const Leaf&) const override { return true; }
+  bool MayDivide(const Leaf& leaf) const override {
+    return !shoals_only_ || HoldsDepth(leaf);
+  }
 
   bool Apply(const CellEvidence& evidence, Leaf& leaf) const override {
-    if (leaf.kind() == LeafKind::kPrior || leaf.kind() == LeafKind::kMeasured) {
+    if (shoals_only_) return HoldsDepth(leaf) && AddShoal(evidence, leaf);
+    if (HoldsDepth(leaf)) {
       FuseLeaf(evidence, LeafKind::kMeasured, leaf);
     } else {
       // Unknown; or charted land on which a vehicle found water.
@@ -126,6 +134,7 @@ class TransferRule final : public CellRule {
 
   const Quadrilateral& area_;
   const GlobalMap::CellSource& source_;
+  const bool shoals_only_;
   std::uint64_t ignored_ = 0;
 };
 
@@ -147,6 +156,18 @@ int SamplesPerSide(double ratio, const std::array<SquarePoint, 4>& corners) {
 GlobalMap::WriteSummary GlobalMap::MergeArea(
     const std::array<GeodeticPoint, 4>& corners, double cell_size_m,
     const CellSource& source) {
+  return WriteEvidence(corners, cell_size_m, source, /*shoals_only=*/false);
+}
+
+GlobalMap::WriteSummary GlobalMap::MergeShoals(
+    const std::array<GeodeticPoint, 4>& corners, double cell_size_m,
+    const CellSource& source) {
+  return WriteEvidence(corners, cell_size_m, source, /*shoals_only=*/true);
+}
+
+GlobalMap::WriteSummary GlobalMap::WriteEvidence(
+    const std::array<GeodeticPoint, 4>& corners, double cell_size_m,
+    const CellSource& source, bool shoals_only) {
   const RootSquare& root = options_.root;
   std::array<SquarePoint, 4> places;
   SquarePoint low{.u = 1, .v = 1};
@@ -170,8 +191,10 @@ GlobalMap::WriteSummary GlobalMap::MergeArea(
   const int samples =
       SamplesPerSide(root.cell_size_m(level) / cell_size_m, places);
 
+  if (shoals_only && samples == 1) return {};
+
   const Quadrilateral area(places);
-  TransferRule rule(area, source);
+  TransferRule rule(area, source, shoals_only);
   AreaWriter writer(root, *tree_, level, samples, rule);
   writer.WriteRange({.row_begin = index(low.u),
                      .row_last = index(high.u),

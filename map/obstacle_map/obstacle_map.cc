@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <set>
+#include <utility>
 
 #include "absl/strings/str_format.h"
 #include "base/status_macros.h"
@@ -31,6 +34,68 @@ bool Overlaps(const RootSquare& root, const LocalMapView& area) {
         return root.Locate(area.CellCenter(corner), 0).has_value();
       });
 }
+
+// Side of the leaves to which local cells of this size are written.
+double LeafSizeM(const RootSquare& root, double cell_size_m) {
+  return root.cell_size_m(root.LevelFor(cell_size_m));
+}
+
+// Areas of the size of blocks, by row and column of blocks from the map's
+// south-west corner; they go on beyond its borders.
+class BlockAreas {
+ public:
+  explicit BlockAreas(const LocalMapView& local) : local_(local) {}
+
+  using Index = std::pair<int64_t, int64_t>;
+  using Set = std::set<Index>;
+
+  // The block with this south-west corner.
+  Index IndexOf(const GeodeticPoint& south_west) const {
+    const NedPoint corner = local_.frame().ToNed(south_west);
+    const double block_m = local_.options().cell_size_m * kBlockSide;
+    return {std::llround(corner.north_m / block_m),
+            std::llround(corner.east_m / block_m)};
+  }
+
+  // What lies beside `blocks` within three quarters (half a diagonal) of
+  // `leaf_cells` local cells, of which leaves hear kMaxSamplesPerSide.
+  static Set Around(const Set& blocks, double leaf_cells) {
+    const double heard =
+        std::min(leaf_cells, double{GlobalMap::kMaxSamplesPerSide});
+    const auto reach =
+        static_cast<int64_t>(std::ceil(0.75 * heard / kBlockSide));
+    Set around;
+    for (const auto& [row, col] : blocks) {
+      for (int64_t r = row - reach; r <= row + reach; ++r) {
+        for (int64_t c = col - reach; c <= col + reach; ++c) {
+          if (!blocks.contains({r, c})) around.emplace(r, c);
+        }
+      }
+    }
+    return around;
+  }
+
+  AreaCorners Corners(int64_t row, int64_t col) const {
+    return {Corner(row, col), Corner(row + 1, col), Corner(row + 1, col + 1),
+            Corner(row, col + 1)};
+  }
+
+ private:
+  // The last row and column are cut at the map's border, as its blocks are.
+  static double Line(int64_t index, int64_t cells) {
+    const int64_t blocks = (cells + kBlockSide - 1) / kBlockSide;
+    return static_cast<double>(index < blocks
+                                   ? index * kBlockSide
+                                   : cells + (index - blocks) * kBlockSide);
+  }
+  GeodeticPoint Corner(int64_t row, int64_t col) const {
+    const double cell_m = local_.options().cell_size_m;
+    return local_.frame().ToGeodetic(Line(row, local_.cells_north()) * cell_m,
+                                     Line(col, local_.cells_east()) * cell_m);
+  }
+
+  const LocalMapView& local_;
+};
 
 }  // namespace
 
@@ -132,14 +197,27 @@ TransferResult ObstacleMap::TransferEvidence(OpenActivity& open) {
   const GlobalMap::CellSource evidence = [&local](const GeodeticPoint& center) {
     return local.EvidenceAt(center);
   };
+  const BlockAreas areas(local);
+  BlockAreas::Set measured;
   local.ForEachMeasuredArea(
       [&](const AreaCorners& corners, size_t measured_cells) {
+        measured.insert(areas.IndexOf(corners[0]));
         result.local_cells += measured_cells;
         const GlobalMap::WriteSummary written =
             global_.MergeArea(corners, open.view.options.cell_size_m, evidence);
         result.leaves_written += written.leaves_written;
         result.degraded += written.degraded;
       });
+  // Larger leaves reach into the measured areas from beside them.
+  const double cell_m = open.view.options.cell_size_m;
+  const double leaf_m = LeafSizeM(options_.global.root, cell_m);
+  if (leaf_m > cell_m) {
+    for (const auto& [row, col] : areas.Around(measured, leaf_m / cell_m)) {
+      result.leaves_written +=
+          global_.MergeShoals(areas.Corners(row, col), cell_m, evidence)
+              .leaves_written;
+    }
+  }
   result.leaves_after_write = global_.View().known_leaf_count();
   global_.Conglomerate(MergeRule::kRange, OpenAreas(&open));
   global_view_ = global_.View();
@@ -155,12 +233,14 @@ std::vector<LatticeBox> ObstacleMap::OpenAreas(const OpenActivity* but) {
     const LocalMapView local = open.local.View();
     const double cell_m = open.view.options.cell_size_m;
     // A cell more to each side: a global cell may stand out of the area.
-    const double north_m = cell_m * (local.cells_north() + 1.0);
-    const double east_m = cell_m * (local.cells_east() + 1.0);
+    const double rim_m =
+        std::max(cell_m, LeafSizeM(options_.global.root, cell_m));
+    const double north_m = cell_m * local.cells_north() + rim_m;
+    const double east_m = cell_m * local.cells_east() + rim_m;
     const NedFrame& frame = local.frame();
     const auto box = options_.global.root.BoxAround(
-        {frame.ToGeodetic(-cell_m, -cell_m), frame.ToGeodetic(north_m, -cell_m),
-         frame.ToGeodetic(north_m, east_m), frame.ToGeodetic(-cell_m, east_m)});
+        {frame.ToGeodetic(-rim_m, -rim_m), frame.ToGeodetic(north_m, -rim_m),
+         frame.ToGeodetic(north_m, east_m), frame.ToGeodetic(-rim_m, east_m)});
     if (box.has_value()) areas.push_back(*box);
   }
   return areas;

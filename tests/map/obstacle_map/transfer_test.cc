@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -164,8 +165,8 @@ TEST_P(TransferTest, LeavesNoPinhole) {
 }
 
 // Cells measured alone, each with leaves of its own. (Where leaves are larger
-// than local cells only those with their middle in a measured area are written:
-// domain.md's rule again.)
+// than local cells only those with their middle in a measured area take its
+// mean: domain.md's rule again. No shoal is lost: see below.)
 TEST_P(TransferTest, SkipsNoMeasuredCell) {
   if (LeafM() > GetParam().local_cell_m) GTEST_SKIP() << "leaves are larger";
   std::vector<CellIndex> cells;
@@ -195,55 +196,113 @@ TEST_P(TransferTest, SkipsNoMeasuredCell) {
   EXPECT_EQ(skipped, 0) << "of " << cells.size();
 }
 
-// A rock that fills one local cell: what the local map would not call free the
-// global map must not either.
-TEST_P(TransferTest, AveragesNoShoalAway) {
-  std::mt19937 random(4);
-  // A leaf with its middle outside the map is not written.
-  const int rim = static_cast<int>(LeafM() / GetParam().local_cell_m);
-  std::uniform_int_distribution<int> place(rim, kCells - 1 - rim);
-  std::vector<CellIndex> rocks;
-  for (int n = 0; n < 40; ++n) {
-    rocks.push_back({.i = place(random), .j = place(random)});
-  }
-  Measure([&](CellIndex cell) -> std::optional<float> {
-    for (const CellIndex& rock : rocks) {
-      if (rock.i == cell.i && rock.j == cell.j) return 16.0f;
+// Rocks that fill one local cell: where the local map would not call their tops
+// free the global map must not either.
+class ShoalTest : public TransferTest {
+ protected:
+  static constexpr float kRockM = 16;
+  static constexpr float kFloorM = 20;
+
+  // At random places, of which four are in the corners of the local map.
+  static std::vector<CellIndex> Rocks() {
+    std::mt19937 random(4);
+    std::uniform_int_distribution<int> place(0, kCells - 1);
+    std::vector<CellIndex> rocks = {
+        {0, 0}, {0, kCells - 1}, {kCells - 1, 0}, {kCells - 1, kCells - 1}};
+    for (int n = 0; n < 40; ++n) {
+      rocks.push_back({.i = place(random), .j = place(random)});
     }
-    return 20.0f;
-  });
-  const auto free_rocks = [&](const ObstacleMapView& view) {
+    return rocks;
+  }
+
+  static bool IsIn(const std::vector<CellIndex>& cells, CellIndex cell) {
+    return std::any_of(cells.begin(), cells.end(), [&](const CellIndex& one) {
+      return one.i == cell.i && one.j == cell.j;
+    });
+  }
+
+  // A chart of the floor that knows of no rock, over the survey and beyond.
+  void ImportChart() {
+    RasterBlock chart;
+    const GeodeticPoint a = PointAt(0, 0);
+    const GeodeticPoint b = PointAt(kCells, kCells);
+    chart.latitude_step_deg = (b.latitude_deg - a.latitude_deg) / 4;
+    chart.longitude_step_deg = (b.longitude_deg - a.longitude_deg) / 4;
+    chart.north_west = {
+        .latitude_deg = b.latitude_deg + 4 * chart.latitude_step_deg,
+        .longitude_deg = a.longitude_deg - 4 * chart.longitude_step_deg};
+    chart.rows = chart.columns = 12;
+    chart.depth_m.assign(144, kFloorM);
+    chart.std_m = {0.5f};
+    const auto imported = map_.Import(chart, true);
+    ASSERT_TRUE(imported.ok()) << imported.status();
+    ASSERT_TRUE(map_.View()->global().At(PointAt(-1, -1)).has_value());
+  }
+
+  int FreeOf(const std::vector<CellIndex>& rocks) {
+    const auto view = map_.View();
     int free = 0;
     for (const CellIndex& rock : rocks) {
       const ObstacleAnswer answer =
-          view.Answer({.position = PointAt(rock.i + 0.5, rock.j + 0.5),
-                       .depth_m = 16,
-                       .time = At(3)});
+          view->Answer({.position = PointAt(rock.i + 0.5, rock.j + 0.5),
+                        .depth_m = kRockM,
+                        .time = At(3)});
       free += answer.state == ObstacleState::kFree ? 1 : 0;
     }
     return free;
-  };
-  EXPECT_EQ(free_rocks(*map_.View()), 0);
+  }
+};
+
+TEST_P(ShoalTest, IsNotAveragedAway) {
+  const std::vector<CellIndex> rocks = Rocks();
+  Measure([&](CellIndex cell) { return IsIn(rocks, cell) ? kRockM : kFloorM; });
+  EXPECT_EQ(FreeOf(rocks), 0);
   Complete();
-  EXPECT_EQ(free_rocks(*map_.View()), 0);
+  EXPECT_EQ(FreeOf(rocks), 0);
+}
+
+TEST_P(ShoalTest, IsNotLostInAChart) {
+  ImportChart();
+  const std::vector<CellIndex> rocks = Rocks();
+  EXPECT_EQ(FreeOf(rocks), static_cast<int>(rocks.size()));
+  Measure([&](CellIndex cell) { return IsIn(rocks, cell) ? kRockM : kFloorM; });
+  Complete();
+  EXPECT_EQ(FreeOf(rocks), 0);
+}
+
+// Nothing but the rocks was measured.
+TEST_P(ShoalTest, MeasuredAloneIsNotLostInAChart) {
+  ImportChart();
+  const std::vector<CellIndex> rocks = Rocks();
+  Measure([&](CellIndex cell) -> std::optional<float> {
+    if (!IsIn(rocks, cell)) return std::nullopt;
+    return kRockM;
+  });
+  EXPECT_EQ(FreeOf(rocks), 0);
+  Complete();
+  EXPECT_EQ(FreeOf(rocks), 0);
 }
 
 constexpr double kThesisSideM = 1267 * 1852.0;
 
-INSTANTIATE_TEST_SUITE_P(
-    Scenes, TransferTest,
-    ::testing::Values(
-        Scene{"ThesisMiddle", 41.5, 3000, -2000, kThesisSideM, 10, 10},
-        Scene{"ThesisCorner", 41.5, 800e3, 900e3, kThesisSideM, 10, 10},
-        Scene{"Equator", 0.1, -500, 7000, 20000, 10, 10},
-        Scene{"South", -60, 4000, 4000, 100e3, 5, 5},
-        Scene{"North", 77, -3000, 5000, 50e3, 2, 2},
-        Scene{"LocalCoarse", 41.5, 30e3, -20e3, 200e3, 3, 7.3},
-        Scene{"LocalFine", 41.5, 30e3, 20e3, kThesisSideM, 10, 5},
-        Scene{"LocalOneMetre", -33, 5000, 6000, 40e3, 10, 1},
-        Scene{"LocalOneMetreCorner", 60, 500e3, 600e3, kThesisSideM, 10, 1},
-        Scene{"LocalHalfMetre", 12, 700, 800, 40e3, 10, 0.5}),
-    [](const auto& scene) { return std::string(scene.param.name); });
+const auto kScenes = ::testing::Values(
+    Scene{"ThesisMiddle", 41.5, 3000, -2000, kThesisSideM, 10, 10},
+    Scene{"ThesisCorner", 41.5, 800e3, 900e3, kThesisSideM, 10, 10},
+    Scene{"Equator", 0.1, -500, 7000, 20000, 10, 10},
+    Scene{"South", -60, 4000, 4000, 100e3, 5, 5},
+    Scene{"North", 77, -3000, 5000, 50e3, 2, 2},
+    Scene{"LocalCoarse", 41.5, 30e3, -20e3, 200e3, 3, 7.3},
+    Scene{"LocalFine", 41.5, 30e3, 20e3, kThesisSideM, 10, 5},
+    Scene{"LocalOneMetre", -33, 5000, 6000, 40e3, 10, 1},
+    Scene{"LocalOneMetreCorner", 60, 500e3, 600e3, kThesisSideM, 10, 1},
+    Scene{"LocalHalfMetre", 12, 700, 800, 40e3, 10, 0.5});
+
+std::string NameOf(const ::testing::TestParamInfo<Scene>& scene) {
+  return scene.param.name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, TransferTest, kScenes, NameOf);
+INSTANTIATE_TEST_SUITE_P(Scenes, ShoalTest, kScenes, NameOf);
 
 }  // namespace
 }  // namespace fathom::map
