@@ -100,7 +100,7 @@ class BlockAreas {
 }  // namespace
 
 ObstacleMap::ObstacleMap(MissionOptions options)
-    : options_(std::move(options)),
+    : options_(options),
       global_(options_.global),
       global_view_(global_.View()),
       contacts_(options_.contacts) {}

@@ -18,6 +18,7 @@
 #include <time.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -96,9 +97,10 @@ ObstacleMap SurveyedMission() {
       Ping ping;
       ping.activity = ActivityId{"a"};
       ping.time = At(kSide * pass + north);
-      ping.pose.position = Place(north + 0.5, kSide / 2);
+      ping.pose.position = Place(north + 0.5, 0.5 * kSide);
       for (int east = 0; east < kSide; ++east) {
-        const float to_east = static_cast<float>(east - kSide / 2) + 0.5f;
+        const float to_east =
+            static_cast<float>(east) + 0.5f - 0.5f * float{kSide};
         ping.beams.push_back(
             {.range_m = std::abs(to_east),
              .bearing_rad = to_east > 0 ? 1.5707963f : -1.5707963f,
@@ -179,7 +181,7 @@ class Reader {
 
   const Published& published_;
   std::vector<ObstacleQuery> queries_;
-  std::vector<std::int64_t> batches_ns_[kStop];
+  std::array<std::vector<std::int64_t>, kStop> batches_ns_;
   std::atomic<Phase> phase_ = kWarm;
   std::thread thread_;
 };

@@ -215,7 +215,7 @@ class Transfers : public ::testing::TestWithParam<int> {
  protected:
   // The soundings in GetParam() shares, one transfer each.
   static std::vector<CellEvidence> Shares(const Case& one) {
-    const std::size_t size = one.soundings.size() / GetParam();
+    const auto size = static_cast<std::size_t>(kSoundings / GetParam());
     std::vector<CellEvidence> shares;
     for (std::size_t begin = 0; begin < one.soundings.size(); begin += size) {
       shares.push_back(Batch(std::span(one.soundings).subspan(begin, size)));
