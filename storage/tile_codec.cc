@@ -15,7 +15,7 @@ namespace fathom::storage {
 namespace {
 
 constexpr std::uint8_t kTileVersion = 2;
-constexpr std::uint8_t kBlockVersion = 2;
+constexpr std::uint8_t kBlockVersion = 3;
 
 enum TileFlag : std::uint8_t {
   kHasResiduals = 1,
@@ -40,34 +40,44 @@ bool IsSet(const CellMask& mask, std::size_t k) {
   return ((mask[k / 8] >> (k % 8)) & 1) != 0;
 }
 
-// The cells that differ from an untouched one, and only those: a swath covers
-// the blocks at its border thinly.
-void PutEvidence(std::span<const map::Evidence> cells, ByteWriter& writer) {
-  const map::Evidence untouched;
+// The touched cells in order, as they are kept: all fresh, then all transferred
+// evidence if there is any.
+void PutEvidence(const map::EvidenceCells& cells, ByteWriter& writer) {
   CellMask mask = {};
-  std::vector<map::Evidence> touched;
+  std::vector<map::PackedEvidence> packed;
+  packed.reserve(2 * cells.size());
   for (std::size_t k = 0; k < map::kBlockCells; ++k) {
-    // Compared as bits: shoalest_m is NaN in the untouched.
-    if (std::memcmp(&cells[k], &untouched, sizeof(untouched)) == 0) continue;
+    if (!cells.touched(k)) continue;
     mask[k / 8] |= static_cast<std::uint8_t>(1u << (k % 8));
-    touched.push_back(cells[k]);
+    packed.push_back(*cells.Find(k));
   }
+  for (std::size_t k = 0; cells.any_transferred() && k < map::kBlockCells;
+       ++k) {
+    if (cells.touched(k)) packed.push_back(*cells.FindTransferred(k));
+  }
+  writer.PutU32(cells.window_s());
   writer.PutBytes(mask);
-  PutColumnBytes(touched.data(), touched.size(), sizeof(map::Evidence), writer);
+  PutColumnBytes(packed.data(), packed.size(), sizeof(map::PackedEvidence),
+                 writer);
 }
 
-void GetEvidence(ByteReader& reader, std::span<map::Evidence> cells) {
+void GetEvidence(ByteReader& reader, bool any_transferred,
+                 map::EvidenceCells& cells) {
+  cells.set_window_s(reader.GetU32());
   CellMask mask = {};
   const ByteSpan stored = reader.GetBytes(mask.size());
   std::copy(stored.begin(), stored.end(), mask.begin());
   std::size_t count = 0;
   for (std::size_t k = 0; k < map::kBlockCells; ++k) count += IsSet(mask, k);
-  std::vector<map::Evidence> touched(count);
-  GetColumnBytes(reader, count, sizeof(map::Evidence), touched.data());
+  std::vector<map::PackedEvidence> packed(any_transferred ? 2 * count : count);
+  GetColumnBytes(reader, packed.size(), sizeof(map::PackedEvidence),
+                 packed.data());
   if (!reader.ok()) return;
-  auto next = touched.begin();
+  std::size_t n = 0;
   for (std::size_t k = 0; k < map::kBlockCells; ++k) {
-    if (IsSet(mask, k)) cells[k] = *next++;
+    if (!IsSet(mask, k)) continue;
+    cells.Restore(k, packed[n], any_transferred ? &packed[count + n] : nullptr);
+    ++n;
   }
 }
 
@@ -138,7 +148,7 @@ Bytes EncodeBlock(const BlockKey& key, const map::LocalBlock& block) {
   ByteWriter writer = StartBlob();
   writer.PutU64(key.Packed());
   std::uint8_t flags = 0;
-  if (!block.transferred.empty()) flags |= kHasTransferred;
+  if (block.evidence.any_transferred()) flags |= kHasTransferred;
   if (block.prior_grid != nullptr) flags |= kHasPriorGrid;
   if (!block.nervegna.empty()) flags |= kHasNervegna;
   if (!block.pending.empty()) flags |= kHasPending;
@@ -151,7 +161,6 @@ Bytes EncodeBlock(const BlockKey& key, const map::LocalBlock& block) {
   writer.PutF32(block.uniform_prior.hazard_m);
   writer.PutU8(static_cast<std::uint8_t>(block.uniform_prior.kind));
   PutEvidence(block.evidence, writer);
-  if (!block.transferred.empty()) PutEvidence(block.transferred, writer);
   if (block.prior_grid != nullptr) {
     PutColumn(std::span<const float>(block.prior_grid->depth_m), writer);
     PutColumn(std::span<const float>(block.prior_grid->std_m), writer);
@@ -189,11 +198,7 @@ absl::StatusOr<map::LocalBlock> DecodeBlock(const BlockKey& key,
   block.uniform_prior.hazard_m = reader.GetF32();
   block.uniform_prior.kind = static_cast<map::EvidenceKind>(reader.GetU8());
   CheckKind(block.uniform_prior.kind, reader);
-  GetEvidence(reader, block.evidence);
-  if ((flags & kHasTransferred) != 0) {
-    block.transferred.resize(map::kBlockCells);
-    GetEvidence(reader, block.transferred);
-  }
+  GetEvidence(reader, (flags & kHasTransferred) != 0, block.evidence);
   if ((flags & kHasPriorGrid) != 0) {
     auto grid = std::make_shared<map::PriorGrid>();
     GetColumnBytes(reader, map::kBlockCells, 4, grid->depth_m.data());

@@ -43,7 +43,7 @@ Bytes EncodeTile(const map::TileKey& key, const map::TileContent& content);
 absl::StatusOr<map::TileContent> DecodeTile(const map::TileKey& key,
                                             ByteSpan blob);
 
-// REQUIRES: `transferred` and `nervegna` hold 0 or 256 elements.
+// REQUIRES: `nervegna` holds 0 or 256 elements.
 Bytes EncodeBlock(const BlockKey& key, const map::LocalBlock& block);
 // Errors: DATA_LOSS naming the block; UNIMPLEMENTED for a newer version.
 absl::StatusOr<map::LocalBlock> DecodeBlock(const BlockKey& key, ByteSpan blob);

@@ -36,9 +36,7 @@ class Tracer {
       for (std::size_t i = 0; i < segments_.size(); ++i) {
         if (segments_[i].used) continue;
         const auto [first, second] = segments_[i].edges;
-        if (!ends_only) {
-          lines.push_back(Follow(i, first));
-        } else if (touching_[first].size() == 1) {
+        if (!ends_only || touching_[first].size() == 1) {
           lines.push_back(Follow(i, first));
         } else if (touching_[second].size() == 1) {
           lines.push_back(Follow(i, second));
@@ -86,8 +84,9 @@ class Tracer {
     const std::size_t to = down ? from + columns_ : from + 1;
     const double t = (level_ - values_[from]) /
                      (static_cast<double>(values_[to]) - values_[from]);
+    const std::size_t row = from / columns_;
     const double x = static_cast<double>(from % columns_) + 0.5;
-    const double y = static_cast<double>(from / columns_) + 0.5;
+    const double y = static_cast<double>(row) + 0.5;
     return down ? GridPoint{x, y + t} : GridPoint{x + t, y};
   }
 

@@ -39,6 +39,7 @@
 
 #include "map/geodesy/depth_fusion.h"
 #include "map/local/evidence.h"
+#include "map/local/evidence_cells.h"
 #include "map/local/local_block.h"
 
 namespace fathom::map {
@@ -48,9 +49,8 @@ namespace fathom::map {
 inline constexpr double kTypicalSlope = 0.03;
 
 // A cell and its eight neighbours, three rows from south to north of three
-// from west to east; index 4 is the cell itself. Null: never measured (or
-// outside the map).
-using Neighbourhood = std::array<const Evidence*, 9>;
+// from west to east; index 4 is the cell itself. Null: no evidence there.
+using Neighbourhood = std::array<const PackedEvidence*, 9>;
 inline constexpr std::size_t kCenter = 4;
 
 // What the surroundings say about the variability inside a cell.
@@ -61,7 +61,8 @@ struct RegionalVariability {
 };
 
 // From the steps between the measured cells of the neighbourhood (the centre
-// included) and the neighbours' excess scatter.
+// included) and the neighbours' excess scatter. REQUIRES: what is not null has
+// soundings, and the centre is not null.
 RegionalVariability VariabilityAround(const Neighbourhood& cells,
                                       double cell_size_m);
 
@@ -73,15 +74,16 @@ double VariabilityInside(const Evidence& evidence,
 double MeanVarianceOf(const Evidence& evidence, double variability_m2);
 
 // The whole reading of a measured cell: mean and predictive variance. A prior
-// of kind kNone or kLand is left out. REQUIRES: cells[kCenter] not null and
-// not empty.
+// of kind kNone or kLand is left out. REQUIRES: `evidence` is that of
+// cells[kCenter], see VariabilityAround.
 struct AdaptiveReading {
   MeanVariance predictive;
   double variability_m2 = 0.0;  // tau^2, a part of predictive.variance_m2.
   // hazard_m of DepthEstimate; NaN: none.
   float hazard_m = std::numeric_limits<float>::quiet_NaN();
 };
-AdaptiveReading ReadAdaptive(const Neighbourhood& cells, const CellPrior& prior,
+AdaptiveReading ReadAdaptive(const Evidence& evidence,
+                             const Neighbourhood& cells, const CellPrior& prior,
                              double cell_size_m);
 
 }  // namespace fathom::map

@@ -35,7 +35,7 @@ LocalBlock& BlockDirectory::MakeMutable(BlockIndex index,
 
 void BlockDirectory::CountArrays(const LocalBlock& block, std::int64_t sign) {
   const std::size_t bytes =
-      block.transferred.size() * sizeof(Evidence) +
+      block.evidence.memory_bytes() +
       block.nervegna.size() * sizeof(NervegnaCell) +
       block.pending.size() * sizeof(PendingShoal) +
       (block.prior_grid == nullptr

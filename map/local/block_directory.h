@@ -10,7 +10,7 @@
 //
 // Costs for 25 M cells (313 x 313 blocks): the directory is 400 pointers
 // (6.4 kB) and is copied at most once per view, a superblock (4 kB) and a
-// block (6.2 kB) at most once per view in which it changes.
+// block (at most 5.6 kB) at most once per view in which it changes.
 
 #ifndef FATHOM_MAP_LOCAL_BLOCK_DIRECTORY_H_
 #define FATHOM_MAP_LOCAL_BLOCK_DIRECTORY_H_
@@ -75,11 +75,13 @@ class BlockDirectory {
     return MakeMutable(index, writer_epoch, created);
   }
 
-  // Writer only: a cell of a block was measured for the first time; arrays
-  // were added to (or taken from) a block.
+  // Writer only: cells were measured for the first time; a block holds more
+  // memory outside itself; the same for all that a block holds, before it
+  // changes (-1) and after (+1).
   void CountMeasured(std::int64_t cells) {
     cells_measured_ += static_cast<std::uint64_t>(cells);
   }
+  void CountBytes(std::size_t bytes) { array_bytes_ += bytes; }
   void CountArrays(const LocalBlock& block, std::int64_t sign);
 
   std::uint64_t epoch() const { return epoch_; }

@@ -12,7 +12,6 @@ float ShoalerOf(float a_m, float b_m) { return std::fmin(a_m, b_m); }
 }  // namespace
 
 void Evidence::Merge(const Evidence& other) {
-  flags |= other.flags;
   time_s = std::max(time_s, other.time_s);
   shoalest_m = ShoalerOf(shoalest_m, other.shoalest_m);
   if (other.count == 0) return;

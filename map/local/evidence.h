@@ -1,4 +1,5 @@
-// What soundings alone say about one cell: sufficient statistics, 24 bytes.
+// What soundings alone say about one cell: sufficient statistics. A map keeps
+// them packed (map/local/evidence_cells.h); this is what one reckons with.
 //
 // Each sounding is z_i with stated variance s_i^2, weight w_i = 1 / s_i^2. The
 // cell holds sum w, the weighted mean and the weighted scatter about it. From
@@ -13,8 +14,7 @@
 //
 // Source: weighted Welford update (West 1979, doi:10.1145/359146.359153) and
 // pairwise merge (Chan, Golub, LeVeque 1983,
-// doi:10.1080/00031305.1983.10483115). Plain data, no invariant hidden: storage
-// writes the fields as they are.
+// doi:10.1080/00031305.1983.10483115).
 
 #ifndef FATHOM_MAP_LOCAL_EVIDENCE_H_
 #define FATHOM_MAP_LOCAL_EVIDENCE_H_
@@ -30,13 +30,7 @@ namespace fathom::map {
 inline constexpr float kMinStdM = 1e-3f;
 
 // The most soundings a cell counts: see Evidence::count.
-inline constexpr std::uint32_t kMaxCount = 65'535;
-
-// Evidence::flags, the thesis's flags of fig. 4-4. Stored: never reuse a bit.
-// kDirectlyUpdated: a sounding fell in the cell (it stays over a transfer).
-inline constexpr std::uint16_t kDirectlyUpdated = 1;
-// kSmoothUpdated: `nervegna` wrote to the cell from a neighbour.
-inline constexpr std::uint16_t kSmoothUpdated = 2;
+inline constexpr std::uint32_t kMaxCount = 32'767;
 
 struct Evidence {
   float weight = 0.0f;   // Sum of 1 / s_i^2, 1/m^2; 0: no sounding.
@@ -46,19 +40,20 @@ struct Evidence {
   // Least depth among the credible soundings (see IsCredible); NaN: none.
   float shoalest_m = std::numeric_limits<float>::quiet_NaN();
   std::uint32_t time_s = 0;  // Newest sounding, Unix seconds; 0: none.
-  std::uint16_t count = 0;   // Soundings. At 65535 count, weight and scatter
-                             // are halved: bounded, the mean stays.
-  std::uint16_t flags = 0;
+  std::uint16_t count = 0;   // Soundings. At kMaxCount count, weight and
+                             // scatter are halved: bounded, the mean stays.
 
   // Adds one sounding. REQUIRES: both finite, std_m > 0.
   void Add(float depth_m, float std_m, std::uint32_t sounding_time_s);
+
+  // Of that, weight, mean_m, scatter and count alone.
+  void AddMoments(float depth_m, float std_m);
 
   // Adds all soundings of `other`, as if each had been added.
   void Merge(const Evidence& other);
 
   bool empty() const { return count == 0; }
 };
-static_assert(sizeof(Evidence) == 24);
 
 // Whether a single sounding may by itself set the shoalest depth of a cell:
 // its 95 % uncertainty is within what IHO S-44 (edition 6) allows order 2
@@ -73,8 +68,7 @@ inline bool IsCredible(float depth_m, float std_m) {
 }
 
 // Inline, because each sounding comes this way.
-inline void Evidence::Add(float depth_m, float std_m,
-                          std::uint32_t sounding_time_s) {
+inline void Evidence::AddMoments(float depth_m, float std_m) {
   const float s_m = std::max(std_m, kMinStdM);
   const float w = 1.0f / (s_m * s_m);
   if (count == kMaxCount) {
@@ -93,9 +87,14 @@ inline void Evidence::Add(float depth_m, float std_m,
     scatter += w * from_old_m * (depth_m - mean_m);
   }
   ++count;
+}
+
+inline void Evidence::Add(float depth_m, float std_m,
+                          std::uint32_t sounding_time_s) {
+  AddMoments(depth_m, std_m);
   time_s = std::max(time_s, sounding_time_s);
   // Written so that a NaN, "none yet", gives way.
-  if (!(shoalest_m <= depth_m) && IsCredible(depth_m, s_m)) {
+  if (!(shoalest_m <= depth_m) && IsCredible(depth_m, std_m)) {
     shoalest_m = depth_m;
   }
 }

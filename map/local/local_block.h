@@ -23,12 +23,10 @@
 
 #include "map/geodesy/depth_estimate.h"
 #include "map/local/evidence.h"
+#include "map/local/evidence_cells.h"
 #include "map/local/hazard.h"
 
 namespace fathom::map {
-
-inline constexpr std::uint32_t kBlockSide = 16;
-inline constexpr std::size_t kBlockCells = 256;
 
 // A block of the map: counted northward and eastward from the south-west.
 struct BlockIndex {
@@ -73,13 +71,11 @@ struct NervegnaCell {
 };
 
 struct LocalBlock {
-  // Since the start or the last transfer. All estimators fill it.
-  std::array<Evidence, kBlockCells> evidence = {};
-
-  // What a transfer has already carried to the global map; empty, or 256.
-  // Readers merge both, so a transfer changes no answer of this map; the next
-  // transfer moves `evidence` alone.
-  std::vector<Evidence> transferred;
+  // What soundings say. All estimators fill it. Touched are the cells that were
+  // measured and, with `nervegna`, those that smoothing wrote to: the flags of
+  // fig. 4-4. Readers use all of a cell's evidence, so a transfer changes no
+  // answer of this map; the next transfer moves what is fresh alone.
+  EvidenceCells evidence;
 
   // Asked for once, when the block was first touched, and kept with it: so a
   // replay gives the same map whatever the global map has become.
@@ -102,12 +98,6 @@ struct LocalBlock {
     if (!prior_grid->hazard_m.empty()) here.hazard_m = prior_grid->hazard_m[k];
     return here;
   }
-  // All soundings of the cell, transferred or not.
-  Evidence AllEvidence(std::size_t k) const {
-    Evidence all = evidence[k];
-    if (!transferred.empty()) all.Merge(transferred[k]);
-    return all;
-  }
   // Null: none waits in the cell.
   const PendingShoal* PendingAt(std::size_t k) const {
     if (pending.empty()) return nullptr;
@@ -116,9 +106,7 @@ struct LocalBlock {
         [k](const PendingShoal& shoal) { return shoal.cell == k; });
     return found == pending.end() ? nullptr : &*found;
   }
-  bool measured(std::size_t k) const {
-    return (evidence[k].flags & kDirectlyUpdated) != 0;
-  }
+  bool measured(std::size_t k) const { return evidence.measured(k); }
 };
 
 }  // namespace fathom::map

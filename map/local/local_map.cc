@@ -110,7 +110,7 @@ void FuseNervegna(double k, double mean_m, double first_variance_m2,
 // soundings; while these are few the shoalest of its measured neighbours in
 // the block; NaN where these are few too.
 float FloorAround(const LocalBlock& block, std::size_t k) {
-  const Evidence own = block.AllEvidence(k);
+  const Evidence own = block.evidence.All(k);
   if (own.count >= kGateSoundings) return own.mean_m;
   const std::size_t row = k / kBlockSide;
   const std::size_t col = k % kBlockSide;
@@ -122,19 +122,13 @@ float FloorAround(const LocalBlock& block, std::size_t k) {
          j <= std::min<std::size_t>(col + 1, kBlockSide - 1); ++j) {
       const std::size_t near = i * kBlockSide + j;
       if (near == k || !block.measured(near)) continue;
-      shoalest_m = std::min(shoalest_m, block.AllEvidence(near).mean_m);
+      shoalest_m = std::min(shoalest_m, block.evidence.All(near).mean_m);
       ++neighbours;
     }
   }
   return neighbours >= kGateNeighbours
              ? shoalest_m
              : std::numeric_limits<float>::quiet_NaN();
-}
-
-std::int64_t CountMeasuredCells(const LocalBlock& block) {
-  std::int64_t count = 0;
-  for (std::size_t k = 0; k < kBlockCells; ++k) count += block.measured(k);
-  return count;
 }
 
 }  // namespace
@@ -233,11 +227,10 @@ LocalBlock& LocalMap::State::MutableBlock(BlockIndex index,
 
 void LocalMap::State::AddTo(LocalBlock& block, std::size_t k, float depth_m,
                             float std_m, std::uint32_t time_s) {
-  Evidence& evidence = block.evidence[k];
-  evidence.Add(depth_m, std_m, time_s);
-  if ((evidence.flags & kDirectlyUpdated) == 0) {
-    evidence.flags |= kDirectlyUpdated;
+  const std::size_t before = block.evidence.memory_bytes();
+  if (block.evidence.Add(k, depth_m, std_m, time_s)) {
     directory->CountMeasured(+1);
+    directory->CountBytes(block.evidence.memory_bytes() - before);
   }
 }
 
@@ -312,22 +305,24 @@ void LocalMap::State::Smooth(CellIndex cell, const NervegnaCell& updated,
       const std::int32_t east = std::min(bounds.east, next_west - 1);
       LocalBlock& block =
           MutableBlock(LocalGrid::BlockOf({.i = south, .j = west}), prior);
+      const std::size_t before = block.evidence.memory_bytes();
       for (std::int32_t i = south; i <= north; ++i) {
         for (std::int32_t j = west; j <= east; ++j) {
           const CellIndex near = {.i = i, .j = j};
           const std::size_t k = LocalGrid::OffsetOf(near);
-          Evidence& evidence = block.evidence[k];
-          if ((evidence.flags & kDirectlyUpdated) != 0) continue;
+          if (block.measured(k)) continue;
           NervegnaCell& estimate = block.nervegna[k];
           const std::uint32_t apart = CellsApart(near, cell);
           FuseNervegna(SmoothGain(scale, estimate.variance_m2,
                                   updated.variance_m2, apart),
                        updated.mean_m, double{updated.variance_m2} + apart,
                        estimate);
-          evidence.flags |= kSmoothUpdated;
+          Evidence evidence = block.evidence.Fresh(k);
           evidence.time_s = std::max(evidence.time_s, time_s);
+          block.evidence.Set(k, evidence, /*measured=*/false);
         }
       }
+      directory->CountBytes(block.evidence.memory_bytes() - before);
       west = next_west;
     }
     south = next_south;
@@ -396,20 +391,10 @@ LocalMap::UpdateResult LocalMap::Update(const Ping& ping,
 void LocalMap::MarkTransferred() {
   const LocalMapView before = View();
   before.ForEachBlock([this](BlockIndex index, const LocalBlock& seen) {
-    const bool any =
-        std::any_of(seen.evidence.begin(), seen.evidence.end(),
-                    [](const Evidence& cell) { return !cell.empty(); });
-    if (!any) return;
+    if (seen.evidence.CountFresh() == 0) return;
     LocalBlock& block = state_->MutableBlock(index, nullptr);
     state_->directory->CountArrays(block, -1);
-    block.transferred.resize(kBlockCells);
-    for (std::size_t k = 0; k < kBlockCells; ++k) {
-      block.transferred[k].Merge(block.evidence[k]);
-      // The flags stay: the cell was measured, wherever its evidence lies.
-      const std::uint16_t flags = block.evidence[k].flags;
-      block.evidence[k] = Evidence{};
-      block.evidence[k].flags = flags;
-    }
+    block.evidence.MarkTransferred();
     state_->directory->CountArrays(block, +1);
   });
 }
@@ -428,11 +413,6 @@ absl::Status LocalMap::RestoreBlock(BlockIndex index, LocalBlock block) {
         "block row=%u col=%u: nervegna cells=%u must be %u", index.row,
         index.col, block.nervegna.size(), nervegna_cells));
   }
-  if (!block.transferred.empty() && block.transferred.size() != kBlockCells) {
-    return absl::InvalidArgumentError(absl::StrFormat(
-        "block row=%u col=%u: transferred cells=%u must be 0 or 256", index.row,
-        index.col, block.transferred.size()));
-  }
   for (std::size_t n = 0; n < block.pending.size(); ++n) {
     const std::uint16_t cell = block.pending[n].cell;
     if (cell >= kBlockCells || (n > 0 && cell <= block.pending[n - 1].cell)) {
@@ -445,7 +425,8 @@ absl::Status LocalMap::RestoreBlock(BlockIndex index, LocalBlock block) {
   BlockDirectory& mine = state_->MutableDirectory();
   bool created = false;
   LocalBlock& here = mine.Mutable(index, state_->epoch, created);
-  mine.CountMeasured(CountMeasuredCells(block) - CountMeasuredCells(here));
+  mine.CountMeasured(static_cast<std::int64_t>(block.evidence.CountMeasured()) -
+                     static_cast<std::int64_t>(here.evidence.CountMeasured()));
   mine.CountArrays(here, -1);
   mine.CountArrays(block, +1);
   here = std::move(block);

@@ -25,43 +25,39 @@ Place PlaceOf(const BlockDirectory& directory, CellIndex cell) {
           .k = LocalGrid::OffsetOf(cell)};
 }
 
-// Room for the evidence of cells of which a part was transferred; left
-// uninitialised because it is rarely needed.
-struct Merged {
-  Merged() {}  // NOLINT(modernize-use-equals-default): must not write.
-  union {
-    std::array<Evidence, 9> cells;
-  };
-};
+// Room for cells of which a part was transferred.
+using Merged = std::array<PackedEvidence, 9>;
 
-// Points at the evidence of a cell and its neighbours, in the map or in
-// `merged`.
+// The evidence of a cell and its neighbours, in the map or in `merged`.
 Neighbourhood Around(const LocalGrid& grid, const BlockDirectory& directory,
                      CellIndex cell, Merged& merged) {
   Neighbourhood cells = {};
+  const auto put = [&cells, &merged](std::size_t n, const LocalBlock& block,
+                                     std::size_t k) {
+    const PackedEvidence* found = block.evidence.Find(k);
+    if (found == nullptr) return;
+    if (block.evidence.any_transferred()) {
+      merged[n] = PackMoments(block.evidence.All(k));
+      found = &merged[n];
+    }
+    if (CountOf(*found) != 0) cells[n] = found;
+  };
   const std::uint32_t row = static_cast<std::uint32_t>(cell.i) % kBlockSide;
   const std::uint32_t col = static_cast<std::uint32_t>(cell.j) % kBlockSide;
-  const bool inside =
-      row > 0 && col > 0 && row + 1 < kBlockSide && col + 1 < kBlockSide;
-  const Place center = PlaceOf(directory, cell);
+  if (row > 0 && col > 0 && row + 1 < kBlockSide && col + 1 < kBlockSide) {
+    const Place south_west =
+        PlaceOf(directory, {.i = cell.i - 1, .j = cell.j - 1});
+    for (std::size_t n = 0; n < 9; ++n) {
+      put(n, *south_west.block, south_west.k + n / 3 * kBlockSide + n % 3);
+    }
+    return cells;
+  }
   for (std::size_t n = 0; n < 9; ++n) {
-    Place place;
-    if (inside) {
-      place = {.block = center.block,
-               .k = center.k + (n / 3) * kBlockSide + n % 3 - kBlockSide - 1};
-    } else {
-      const CellIndex at = {.i = cell.i + static_cast<std::int32_t>(n / 3) - 1,
-                            .j = cell.j + static_cast<std::int32_t>(n % 3) - 1};
-      if (!grid.Contains(at)) continue;
-      place = PlaceOf(directory, at);
-    }
-    if (place.block == nullptr || !place.block->measured(place.k)) continue;
-    if (place.block->transferred.empty()) {
-      cells[n] = &place.block->evidence[place.k];
-    } else {
-      cells[n] = std::construct_at(&merged.cells[n],
-                                   place.block->AllEvidence(place.k));
-    }
+    const CellIndex at = {.i = cell.i + static_cast<std::int32_t>(n / 3) - 1,
+                          .j = cell.j + static_cast<std::int32_t>(n % 3) - 1};
+    if (!grid.Contains(at)) continue;
+    const Place place = PlaceOf(directory, at);
+    if (place.block != nullptr) put(n, *place.block, place.k);
   }
   return cells;
 }
@@ -125,20 +121,22 @@ std::optional<DepthEstimate> ReadMeasured(const LocalGrid& grid,
   Evidence evidence;
   switch (grid.options.estimator) {
     case EstimatorKind::kNervegna:
-      evidence = place.block->AllEvidence(place.k);
+      evidence = place.block->evidence.All(place.k);
       read = FromNervegna(place.block->nervegna[place.k]);
       break;
     case EstimatorKind::kKalman:
-      evidence = place.block->AllEvidence(place.k);
+      evidence = place.block->evidence.All(place.k);
       read = ReadKalman(evidence, place.block->prior(place.k));
       break;
     case EstimatorKind::kAdaptive: {
-      Merged merged;
-      const Neighbourhood cells = Around(grid, directory, cell, merged);
+      evidence = place.block->evidence.All(place.k);
       const CellPrior prior = place.block->prior(place.k);
-      return FromAdaptive(ReadAdaptive(cells, prior, cell_size_m),
-                          *cells[kCenter], place.block->PendingAt(place.k),
-                          prior.hazard_m, cell_size_m);
+      Merged merged;
+      return FromAdaptive(
+          ReadAdaptive(evidence, Around(grid, directory, cell, merged), prior,
+                       cell_size_m),
+          evidence, place.block->PendingAt(place.k), prior.hazard_m,
+          cell_size_m);
     }
   }
   return ToEstimate(read, EvidenceKind::kMeasured, evidence, cell_size_m);
@@ -196,11 +194,7 @@ MeasuredNear MeasuredAround(const LocalGrid& grid,
     if (!grid.Contains(at)) continue;
     const Place place = PlaceOf(directory, at);
     if (place.block == nullptr || !place.block->measured(place.k)) continue;
-    if (place.block->transferred.empty()) {
-      near.Add(to.north, to.east, place.block->evidence[place.k]);
-    } else {
-      near.Add(to.north, to.east, place.block->AllEvidence(place.k));
-    }
+    near.Add(to.north, to.east, place.block->evidence.All(place.k));
   }
   return near;
 }
@@ -233,13 +227,12 @@ std::optional<DepthEstimate> ReadUnmeasured(const LocalGrid& grid,
                                             CellIndex cell) {
   const Place place = PlaceOf(directory, cell);
   if (grid.options.estimator == EstimatorKind::kNervegna) {
-    if (place.block == nullptr ||
-        (place.block->evidence[place.k].flags & kSmoothUpdated) == 0) {
+    if (place.block == nullptr || !place.block->evidence.touched(place.k)) {
       return std::nullopt;
     }
-    return ToEstimate(FromNervegna(place.block->nervegna[place.k]),
-                      EvidenceKind::kSmoothed, place.block->evidence[place.k],
-                      grid.options.cell_size_m);
+    return ToEstimate(
+        FromNervegna(place.block->nervegna[place.k]), EvidenceKind::kSmoothed,
+        place.block->evidence.Fresh(place.k), grid.options.cell_size_m);
   }
   if (grid.reach == 0) return std::nullopt;
   return ReadNear(grid, directory, cell, place);
@@ -291,7 +284,7 @@ std::optional<DepthEstimate> LocalMapView::EvidenceAt(
   if (!cell.has_value()) return std::nullopt;
   const Place place = PlaceOf(*directory_, *cell);
   if (place.block == nullptr) return std::nullopt;
-  const Evidence& evidence = place.block->evidence[place.k];
+  const Evidence evidence = place.block->evidence.Fresh(place.k);
   if (evidence.empty()) return std::nullopt;
   const double cell_size_m = grid_->options.cell_size_m;
   MeanVariance read = {.mean_m = evidence.mean_m,
@@ -307,9 +300,10 @@ std::optional<DepthEstimate> LocalMapView::EvidenceAt(
       // they know may be used; of the cell itself only what is new.
       Merged merged;
       Neighbourhood cells = Around(*grid_, *directory_, *cell, merged);
-      cells[kCenter] = &evidence;
-      return FromAdaptive(ReadAdaptive(cells, CellPrior{}, cell_size_m),
-                          evidence, nullptr, CellPrior{}.hazard_m, cell_size_m);
+      cells[kCenter] = place.block->evidence.Find(place.k);
+      return FromAdaptive(
+          ReadAdaptive(evidence, cells, CellPrior{}, cell_size_m), evidence,
+          nullptr, CellPrior{}.hazard_m, cell_size_m);
     }
   }
   return ToEstimate(read, EvidenceKind::kMeasured, evidence, cell_size_m);
@@ -330,9 +324,7 @@ void LocalMapView::ForEachMeasuredArea(
     const std::function<void(const AreaCorners& corners,
                              std::size_t measured_cells)>& visit) const {
   ForEachBlock([&](BlockIndex index, const LocalBlock& block) {
-    const std::size_t measured = static_cast<std::size_t>(
-        std::count_if(block.evidence.begin(), block.evidence.end(),
-                      [](const Evidence& cell) { return !cell.empty(); }));
+    const std::size_t measured = block.evidence.CountFresh();
     if (measured == 0) return;
     const std::uint32_t south = index.row * kBlockSide;
     const std::uint32_t west = index.col * kBlockSide;

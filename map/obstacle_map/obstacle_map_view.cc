@@ -18,27 +18,25 @@ bool IsMeasured(const std::optional<DepthEstimate>& estimate) {
   return estimate.has_value() && estimate->kind == EvidenceKind::kMeasured;
 }
 
-void AddEvidence(const Evidence& evidence, Digest64& digest) {
-  digest.Add(evidence.weight);
-  digest.Add(evidence.mean_m);
-  digest.Add(evidence.scatter);
-  digest.Add(evidence.shoalest_m);
-  digest.Add(uint64_t{evidence.time_s});
-  digest.Add(uint64_t{evidence.count} << 16 | evidence.flags);
+void AddEvidence(const PackedEvidence* cell, Digest64& digest) {
+  if (cell == nullptr) return;
+  digest.Add(cell->weight);
+  digest.Add(cell->mean_m);
+  digest.Add(cell->scatter);
+  digest.Add(uint64_t{cell->shoalest_time} << 32 | cell->time_count);
 }
 
 void AddBlock(BlockIndex index, const LocalBlock& block, Digest64& digest) {
   digest.Add(uint64_t{index.row} << 32 | index.col);
+  digest.Add(uint64_t{block.evidence.window_s()} << 32 | block.evidence.size());
   for (std::size_t k = 0; k < kBlockCells; ++k) {
-    AddEvidence(block.evidence[k], digest);
+    AddEvidence(block.evidence.Find(k), digest);
+    AddEvidence(block.evidence.FindTransferred(k), digest);
     const CellPrior prior = block.prior(k);
     digest.Add(prior.depth_m);
     digest.Add(prior.std_m);
     digest.Add(static_cast<uint64_t>(prior.kind));
     digest.Add(prior.hazard_m);
-  }
-  for (const Evidence& evidence : block.transferred) {
-    AddEvidence(evidence, digest);
   }
   for (const NervegnaCell& cell : block.nervegna) {
     digest.Add(cell.mean_m);

@@ -169,7 +169,7 @@ void BM_EncodeBlock(benchmark::State& state) {
   for (std::size_t k = 0; k < map::kBlockCells; ++k) {
     const float depth_m = 20.0f + 0.05f * static_cast<float>(k % 16);
     for (std::uint32_t hit = 0; hit < 1 + k % 5; ++hit) {
-      block.evidence[k].Add(depth_m + noise(random), 0.3f, 1'000'000'000 + hit);
+      block.evidence.Add(k, depth_m + noise(random), 0.3f, 1'000'000'000 + hit);
     }
   }
   const BlockKey key{.activity_number = 1, .index = {}};

@@ -101,16 +101,8 @@ TEST(TileCodec, DamageNeverCrashes) {
                 [&](ByteSpan blob) { DecodeTile(key, blob).IgnoreError(); });
 }
 
-bool SameBits(const void* a, const void* b, std::size_t size) {
-  return size == 0 || std::memcmp(a, b, size) == 0;
-}
-
 void ExpectSameBlock(const map::LocalBlock& a, const map::LocalBlock& b) {
-  EXPECT_TRUE(
-      SameBits(a.evidence.data(), b.evidence.data(), sizeof(a.evidence)));
-  ASSERT_EQ(a.transferred.size(), b.transferred.size());
-  EXPECT_TRUE(SameBits(a.transferred.data(), b.transferred.data(),
-                       a.transferred.size() * sizeof(map::Evidence)));
+  EXPECT_EQ(a.evidence, b.evidence);
   EXPECT_EQ(a.uniform_prior, b.uniform_prior);
   ASSERT_EQ(a.prior_grid == nullptr, b.prior_grid == nullptr);
   if (a.prior_grid != nullptr) {
@@ -124,14 +116,14 @@ map::LocalBlock SampleBlock(int touched) {
   std::mt19937 random(11);
   map::LocalBlock block;
   for (int i = 0; i < touched; ++i) {
-    map::Evidence& cell = block.evidence[random() % map::kBlockCells];
+    map::Evidence cell;
     cell.weight = 11.1f * static_cast<float>(i + 1);
     cell.mean_m = 20.0f + static_cast<float>(i) / 7.0f;
     cell.scatter = 1.0f / static_cast<float>(i + 1);
     cell.shoalest_m = 19.0f;
     cell.time_s = 1'000'000'000u + static_cast<unsigned>(i);
     cell.count = static_cast<std::uint16_t>(i);
-    cell.flags = 1;
+    block.evidence.Set(random() % map::kBlockCells, cell, i % 3 != 0);
   }
   block.uniform_prior = {
       .depth_m = 20.0f, .std_m = 5.0f, .kind = map::EvidenceKind::kPrior};
@@ -151,8 +143,8 @@ TEST(BlockCodec, BlockComesBackBitForBit) {
 TEST(BlockCodec, TransferredPriorsAndNervegnaComeBack) {
   const BlockKey key{.activity_number = 1, .index = {.row = 0, .col = 0}};
   map::LocalBlock block = SampleBlock(20);
-  const map::LocalBlock other = SampleBlock(100);
-  block.transferred.assign(other.evidence.begin(), other.evidence.end());
+  block.evidence.MarkTransferred();
+  block.evidence.Add(3, 18.5f, 0.2f, 1'000'000'100u);
   auto grid = std::make_shared<map::PriorGrid>();
   grid->depth_m.fill(30.0f);
   grid->depth_m[5] = -0.0f;

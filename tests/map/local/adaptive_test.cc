@@ -19,16 +19,25 @@ constexpr double kInf = std::numeric_limits<double>::infinity();
 const CellPrior kPrior20 = {
     .depth_m = 20.0f, .std_m = 5.0f, .kind = EvidenceKind::kPrior};
 
-Neighbourhood Alone(const Evidence& evidence) {
+Neighbourhood Alone(const PackedEvidence& cell) {
   Neighbourhood cells = {};
-  cells[kCenter] = &evidence;
+  cells[kCenter] = &cell;
   return cells;
+}
+
+// Of a cell that nobody is beside.
+MeanVariance Read(const Evidence& evidence, const CellPrior& prior,
+                  double cell_size_m) {
+  return ReadAdaptive(evidence, Alone(PackMoments(evidence)), prior,
+                      cell_size_m)
+      .predictive;
 }
 
 TEST(VariabilityAround, WithoutNeighboursIsThatOfATypicalSlope) {
   Evidence evidence;
   evidence.Add(20.0f, 0.5f, 1);
-  const RegionalVariability around = VariabilityAround(Alone(evidence), 10.0);
+  const PackedEvidence packed = PackMoments(evidence);
+  const RegionalVariability around = VariabilityAround(Alone(packed), 10.0);
   // A step of 0.03 * 10 = 0.3 m per cell: 0.09 / 12 = 0.0075 m^2, known to a
   // factor: (1.6 * (0.0075 + 0.0001))^2 = 1.4787e-4.
   EXPECT_NEAR(around.variance_m2, 0.0075, 1e-12);
@@ -38,12 +47,14 @@ TEST(VariabilityAround, WithoutNeighboursIsThatOfATypicalSlope) {
 TEST(VariabilityAround, APlaneVariesByItsStepsSquaredOverTwelve) {
   // Nine cells of 10000 soundings each (exact, and their places average out),
   // stepping 2 m north and 1 m east.
-  std::array<Evidence, 9> plane;
+  std::array<PackedEvidence, 9> plane;
   Neighbourhood cells;
   for (std::size_t k = 0; k < 9; ++k) {
     const float depth_m =
         20.0f + 2.0f * static_cast<float>(k / 3) + static_cast<float>(k % 3);
-    for (int n = 0; n < 10000; ++n) plane[k].Add(depth_m, 0.01f, 1);
+    Evidence evidence;
+    for (int n = 0; n < 10000; ++n) evidence.Add(depth_m, 0.01f, 1);
+    plane[k] = PackMoments(evidence);
     cells[k] = &plane[k];
   }
   // Steps: (4 + 1) / 12 = 0.41667, uncertain by sampling
@@ -66,8 +77,10 @@ TEST(VariabilityAround, SingleSoundingsScatterInsideTheirCells) {
   Evidence south, center;
   south.Add(20.0f, 0.001f, 1);
   center.Add(22.0f, 0.001f, 1);
-  Neighbourhood cells = Alone(center);
-  cells[1] = &south;
+  const PackedEvidence packed_south = PackMoments(south);
+  const PackedEvidence packed_center = PackMoments(center);
+  Neighbourhood cells = Alone(packed_center);
+  cells[1] = &packed_south;
   EXPECT_NEAR(VariabilityAround(cells, 10.0).variance_m2, 0.27466, 1e-4);
 }
 
@@ -150,13 +163,11 @@ TEST(Adaptive, PriorFifteenMetresWrongIsForgottenAfterTwoHits) {
       .depth_m = 20.0f, .std_m = 1.0f, .kind = EvidenceKind::kPrior};
   Evidence evidence;
   evidence.Add(35.0f, 0.5f, 1);
-  const MeanVariance one =
-      ReadAdaptive(Alone(evidence), wrong, 10.0).predictive;
+  const MeanVariance one = Read(evidence, wrong, 10.0);
   // Either may be wrong: k = 1 / 1.25 = 0.8 about, k (1 - k) 225 = 36 m^2.
   EXPECT_GT(std::sqrt(one.variance_m2), 5.0);
   evidence.Add(35.0f, 0.5f, 2);
-  const MeanVariance two =
-      ReadAdaptive(Alone(evidence), wrong, 10.0).predictive;
+  const MeanVariance two = Read(evidence, wrong, 10.0);
   // Widened prior: 225 m^2 about; pulls by 15 * 0.125 / 225 = 8 mm.
   EXPECT_NEAR(two.mean_m, 35.0, 0.02);
   // sigma / sqrt(2) = 0.354 and a little variability.
@@ -180,8 +191,7 @@ TEST(Adaptive, DisagreeingCertainSoundingsLeaveAStdNotBelowTheirSpread) {
       sum2 += depth_m * depth_m;
     }
     const double spread_m = std::sqrt((sum2 - sum * sum / n) / (n - 1));
-    const MeanVariance read =
-        ReadAdaptive(Alone(evidence), CellPrior{}, 10.0).predictive;
+    const MeanVariance read = Read(evidence, CellPrior{}, 10.0);
     EXPECT_GE(std::sqrt(read.variance_m2), spread_m) << n;
     EXPECT_LE(std::sqrt(read.variance_m2), 1.5 * spread_m) << n;
     EXPECT_NEAR(read.mean_m, sum / n, 1e-3) << n;
@@ -206,8 +216,7 @@ TEST(Adaptive, AgreeingPingsReachTheOptimum) {
                      static_cast<float>(kSigmaM), 1);
       }
       // 1 m cells: hardly any variability is presumed.
-      const MeanVariance read =
-          ReadAdaptive(Alone(evidence), kPrior20, 1.0).predictive;
+      const MeanVariance read = Read(evidence, kPrior20, 1.0);
       const double error_m = read.mean_m - truth_m;
       square += error_m * error_m;
       within_1 += error_m * error_m <= read.variance_m2;

@@ -94,18 +94,18 @@ TEST(Evidence, AStdBelowAMillimetreCountsAsOne) {
 
 TEST(Evidence, AFullCountHalvesAndKeepsItsMean) {
   Evidence evidence;
-  for (int k = 0; k < 65'535; ++k) evidence.Add(20.0f, 1.0f, 1);
-  EXPECT_EQ(evidence.count, 65'535);
-  EXPECT_EQ(evidence.weight, 65'535.0f);
+  for (int k = 0; k < 32'767; ++k) evidence.Add(20.0f, 1.0f, 1);
+  EXPECT_EQ(evidence.count, 32'767);
+  EXPECT_EQ(evidence.weight, 32'767.0f);
   evidence.Add(20.0f, 1.0f, 2);
-  EXPECT_EQ(evidence.count, 32'768);      // 65 535 / 2 + 1.
-  EXPECT_EQ(evidence.weight, 32'768.5f);  // 65 535 / 2 + 1.
+  EXPECT_EQ(evidence.count, 16'384);      // 32 767 / 2 + 1.
+  EXPECT_EQ(evidence.weight, 16'384.5f);  // 32 767 / 2 + 1.
   EXPECT_EQ(evidence.mean_m, 20.0f);
   EXPECT_EQ(evidence.time_s, 2u);
   Evidence twice = evidence;
-  for (int k = 0; k < 40'000; ++k) twice.Add(20.0f, 1.0f, 2);
+  for (int k = 0; k < 20'000; ++k) twice.Add(20.0f, 1.0f, 2);
   twice.Merge(evidence);
-  EXPECT_LE(twice.count, 65'535);
+  EXPECT_LE(twice.count, 32'767);
   EXPECT_NEAR(twice.weight / twice.count, 1.0f, 1e-3);
 }
 
