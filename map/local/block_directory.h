@@ -26,8 +26,8 @@
 namespace fathom::map {
 
 struct BlockNode {
+  std::uint64_t epoch = 0;  // First: fetched together with the block's begin.
   LocalBlock block;
-  std::uint64_t epoch = 0;
 };
 
 struct SuperBlock {

@@ -5,7 +5,7 @@
 namespace fathom::map {
 
 EvidenceCells::EvidenceCells(const EvidenceCells& other)
-    : slots_(other.slots_), window_s_(other.window_s_) {
+    : window_s_(other.window_s_), slots_(other.slots_) {
   fresh_.reserve(RoomFor(other.size()));
   fresh_.assign(other.fresh_.begin(), other.fresh_.end());
   if (!other.any_transferred()) return;

@@ -108,6 +108,11 @@ class EvidenceCells {
   // Adds one sounding (Evidence::Add); true if it is the first ever in the
   // cell.
   bool Add(std::size_t k, float depth_m, float std_m, std::uint32_t time_s);
+  // Hints that Add(k) is near: first the one, some time later the other.
+  void PrefetchPlace(std::size_t k) const { __builtin_prefetch(&slots_[k]); }
+  void PrefetchCell(std::size_t k) const {
+    __builtin_prefetch(fresh_.data() + slots_[k], /*for writing*/ 1);
+  }
   // Replaces the cell's fresh evidence and says whether it was ever measured.
   void Set(std::size_t k, const Evidence& evidence, bool measured) {
     // Packed first: it may move the window.
@@ -167,12 +172,12 @@ class EvidenceCells {
   }
   PackedEvidence& Touch(std::size_t k);
 
+  std::vector<PackedEvidence> fresh_;
+  std::vector<PackedEvidence> transferred_;  // Empty, or as many.
+  std::uint32_t window_s_ = 0;               // A multiple of kHalfWindowS.
   // Where in fresh_ each cell is: a number that is not below size() means
   // nowhere. (With all 256 touched 255 is a place.)
   std::array<std::uint8_t, kBlockCells> slots_;
-  std::uint32_t window_s_ = 0;  // A multiple of kHalfWindowS.
-  std::vector<PackedEvidence> fresh_;
-  std::vector<PackedEvidence> transferred_;  // Empty, or as many.
 };
 
 // Inline from here on, because each sounding comes this way.

@@ -1,9 +1,11 @@
 #include "map/local/local_map.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
 #include <utility>
 
 #include "absl/strings/str_format.h"
@@ -354,6 +356,30 @@ LocalMap::UpdateResult LocalMap::Update(const Ping& ping,
       grid.frame.NorthAzimuthRad(ping.pose.position);
   const std::uint32_t time_s = ToUnixSeconds(ping.time);
   float last_m = std::numeric_limits<float>::quiet_NaN();
+  // Some beams at a time: all are placed, then all are added, so that the
+  // memory of one is fetched while others are reckoned.
+  struct Placed {
+    const Beam* beam;
+    CellIndex cell;
+    LocalBlock* block;
+  };
+  std::array<Placed, 16> placed;
+  std::size_t count = 0;
+  const auto add_placed = [&] {
+    for (const Placed& hit : std::span(placed.data(), count)) {
+      hit.block->evidence.PrefetchCell(LocalGrid::OffsetOf(hit.cell));
+    }
+    for (const Placed& hit : std::span(placed.data(), count)) {
+      if (state_->AddSounding(hit.cell, *hit.beam, time_s, last_m, prior,
+                              *hit.block)) {
+        last_m = hit.beam->depth_m;
+        ++result.accepted;
+      } else {
+        result.rejects.Add(RejectReason::kGated);
+      }
+    }
+    count = 0;
+  };
   // Neighbouring beams fall in few blocks: each is looked up once in a row.
   // It stays where it is while this view's epoch lasts.
   LocalBlock* block = nullptr;
@@ -378,13 +404,11 @@ LocalMap::UpdateResult LocalMap::Update(const Ping& ping,
       block = &state_->MutableBlock(index, prior);
       block_index = index;
     }
-    if (!state_->AddSounding(cell, beam, time_s, last_m, prior, *block)) {
-      result.rejects.Add(RejectReason::kGated);
-      continue;
-    }
-    last_m = beam.depth_m;
-    ++result.accepted;
+    block->evidence.PrefetchPlace(LocalGrid::OffsetOf(cell));
+    placed[count++] = {.beam = &beam, .cell = cell, .block = block};
+    if (count == placed.size()) add_placed();
   }
+  add_placed();
   return result;
 }
 
