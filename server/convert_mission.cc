@@ -157,7 +157,8 @@ absl::Status CheckTileNumbers(const v1::DepthTile& tile,
                               const FieldPath& path) {
   for (int i = 0; i < tile.depth_m_size(); ++i) {
     const float depth_m = tile.depth_m(i);
-    const bool is_land = !tile.land().empty() && tile.land()[i] != 0;
+    const bool is_land =
+        !tile.land().empty() && tile.land()[static_cast<size_t>(i)] != 0;
     if (std::isnan(depth_m) || is_land) continue;
     FATHOM_RETURN_IF_ERROR(CheckDepth(
         depth_m, FieldPath(path, "depth_m", static_cast<size_t>(i))));

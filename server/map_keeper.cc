@@ -110,9 +110,9 @@ void MapKeeper::Push(IngestMessage message,
   const size_t bytes = BytesOf(message);
   pending_messages_ += 1;
   pending_bytes_ += bytes;
-  queue_.push_back(IngestCommand{.message = std::move(message),
-                                 .listener = std::move(listener),
-                                 .bytes = bytes});
+  queue_.emplace_back(IngestCommand{.message = std::move(message),
+                                    .listener = std::move(listener),
+                                    .bytes = bytes});
 }
 
 absl::StatusOr<Room> MapKeeper::Submit(
@@ -126,8 +126,9 @@ absl::StatusOr<Room> MapKeeper::Submit(
   return room ? Room::kSome : Room::kNone;
 }
 
-absl::Status MapKeeper::SubmitAll(std::vector<IngestMessage> messages,
-                                  std::shared_ptr<IngestListener> listener) {
+absl::Status MapKeeper::SubmitAll(
+    std::vector<IngestMessage> messages,
+    const std::shared_ptr<IngestListener>& listener) {
   MutexLock lock(mutex_);
   FATHOM_RETURN_IF_ERROR(Admit());
   if (pending_messages_ + messages.size() > options_.max_pending_ingest) {
@@ -171,7 +172,7 @@ void MapKeeper::Enqueue(Done<Result> done, Apply apply) {
     }
     if (admitted.ok()) {
       pending_commands_ += 1;
-      queue_.push_back(std::move(command));
+      queue_.emplace_back(std::move(command));
       WakeMapper();
       return;
     }

@@ -156,7 +156,7 @@ class MapKeeper {
   // Takes all messages or none. Errors as Submit, and ABORTED if the queue
   // has no room for them now.
   absl::Status SubmitAll(std::vector<IngestMessage> messages,
-                         std::shared_ptr<IngestListener> listener);
+                         const std::shared_ptr<IngestListener>& listener);
 
   // ---- Commands: `done` runs once, when the change is durable or was
   // refused, on a thread of the keeper's. Beside the map's own errors:

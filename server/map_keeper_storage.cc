@@ -111,7 +111,7 @@ absl::Status MapKeeper::CommitItems(std::vector<StorageItem>& items) {
 absl::Status MapKeeper::CommitBatch(const storage::Batch& batch,
                                     const std::vector<StorageItem>& items) {
   while (true) {
-    const absl::Status status = store_.Commit(batch);
+    absl::Status status = store_.Commit(batch);
     if (!absl::IsResourceExhausted(status)) {
       if (status.ok()) {
         MutexLock lock(mutex_);

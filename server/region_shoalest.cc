@@ -69,7 +69,7 @@ bool MayHoldShoaler(const map::LocalBlock& block, size_t k,
 // need not be exact. REQUIRES: the cell was measured.
 float ShoalestOf(const map::LocalMapView& local, const map::LocalBlock& block,
                  map::CellIndex cell, size_t k, float known_m) {
-  const map::Evidence evidence = block.AllEvidence(k);
+  const map::Evidence evidence = block.evidence.All(k);
   // fmin passes over a NaN, "none".
   float shoalest_m = std::fmin(evidence.mean_m, evidence.shoalest_m);
   if (!block.nervegna.empty()) {

@@ -45,17 +45,18 @@ void RevisionGate::Run() {
       MutexLock lock(mutex_);
       while (ready.empty()) {
         const Deadline now = std::chrono::steady_clock::now();
+        reached = reached_;
+        const bool closed = closed_;
         const auto first_ready = std::stable_partition(
-            waiters_.begin(), waiters_.end(), [&](const Waiter& waiter) {
-              return !closed_ && waiter.revision > reached_ &&
+            waiters_.begin(), waiters_.end(), [=](const Waiter& waiter) {
+              return !closed && waiter.revision > reached &&
                      waiter.deadline > now;
             });
         ready.assign(std::make_move_iterator(first_ready),
                      std::make_move_iterator(waiters_.end()));
         waiters_.erase(first_ready, waiters_.end());
-        reached = reached_;
         if (!ready.empty()) break;
-        if (closed_) return;
+        if (closed) return;
         if (waiters_.empty()) {
           changed_.Wait(mutex_);
           continue;

@@ -12,7 +12,6 @@
 #include "grpcpp/server_context.h"
 #include "grpcpp/support/server_callback.h"
 #include "server/call_registry.h"
-#include "server/courier.h"
 #include "server/errors.h"
 #include "server/limits.h"
 #include "server/map_keeper.h"
@@ -26,7 +25,12 @@ struct ServerContext {
   MapKeeper& keeper;
   storage::MissionFile& file;
   const Clock& clock;
-  Courier courier{};
+  // gRPC runs whatever callbacks are ready on the thread that starts an
+  // operation. The keeper's two threads must not be caught up in that, so what
+  // they have to tell a call - an ack to write, room to read on - is done by
+  // the courier: small jobs, one thread, in order.
+  Workers courier{1};
+  // Long ones: a block of a region, a digest, a page of history.
   Workers workers{kWorkerThreads};
   CallSlots bulk_calls{kMaxBulkStreams};
   CallRegistry ingest_calls{kMaxIngestStreams};

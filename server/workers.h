@@ -1,6 +1,5 @@
-// Workers: a few threads for work that takes long - a block of a region, a
-// digest, a page of history - so that gRPC's own threads, which every other
-// call needs, are never kept from answering.
+// Workers: threads that do jobs for gRPC's own threads, which every other call
+// needs, or on behalf of threads that must not wait for gRPC.
 //
 // Thread-safe.
 
@@ -39,8 +38,9 @@ class Workers {
   Workers(const Workers&) = delete;
   Workers& operator=(const Workers&) = delete;
 
-  // Does `job` on one of the threads, begun in the order given. Not bounded by
-  // itself: each call has at most one job waiting, and calls are bounded.
+  // Does `job` on one of the threads, begun in the order given (with one
+  // thread: one after the other). Not bounded by itself: each call has at most
+  // two jobs waiting, and calls are bounded.
   void Give(std::function<void()> job) {
     MutexLock lock(mutex_);
     jobs_.push_back(std::move(job));

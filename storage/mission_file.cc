@@ -334,7 +334,7 @@ absl::Status MissionFile::Impl::CopyLog() {
   if (closed_) return absl::FailedPreconditionError("the mission is closed");
   FATHOM_RETURN_IF_ERROR(failed_);
   if (writer_.LogBytes() == 0) return absl::OkStatus();
-  const absl::Status status = writer_.CheckpointPassive().status();
+  absl::Status status = writer_.CheckpointPassive().status();
   if (absl::IsInternal(status)) failed_ = status;
   return status;
 }

@@ -69,7 +69,9 @@ void MapPanel::AddContourLabels(const std::string& text,
     const double until = std::min(length - width, from + kLabelEvery);
     double best = 0.92;  // Chord per length: what bends more has no label.
     ContourLabel label;
-    for (double at = from; at <= until; at += width / 2) {
+    const int tries = static_cast<int>((until - from) / (width / 2));
+    for (int n = 0; n <= tries; ++n) {
+      const double at = from + n * width / 2;
       const auto index = [&](double s) {
         return static_cast<std::size_t>(
             std::lower_bound(along.begin(), along.end(), s) - along.begin());

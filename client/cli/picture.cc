@@ -310,8 +310,9 @@ absl::Status DrawPicture(const PictureInput& input, const std::string& path) {
   canvas.Text(input.subtitle, kMargin, 66, {.size = 14, .color = kGrey});
   PictureDrawer drawer(input, canvas);
   for (std::size_t i = 0; i < input.panels.size(); ++i) {
+    const std::size_t panel_row = i / columns;
     const auto column = static_cast<double>(i % columns);
-    const auto row = static_cast<double>(i / columns);
+    const auto row = static_cast<double>(panel_row);
     drawer.Draw(
         input.panels[i],
         {kMargin + kLeftLabels + column * (panel_width + kGap + kLeftLabels),

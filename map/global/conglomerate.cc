@@ -109,8 +109,7 @@ class Conglomerator {
 
   // True if the tile has become a single leaf, which then is open.
   bool Visit(WorkNode& node) {
-    const TileKey key =
-        node.work != nullptr ? node.work->key : node.frozen->key();
+    const TileKey key = node.key();
     const bool free = !IsKept(key.Root());
     // A tile that touches a kept area may have more to join when that is free.
     const bool settles = rule_ == MergeRule::kRange && free;

@@ -9,6 +9,7 @@
 #include <new>
 #include <utility>
 
+#include "absl/base/macros.h"
 #include "absl/strings/str_format.h"
 
 namespace fathom::map {
@@ -71,6 +72,8 @@ struct Tile::Rank {
 
   int Level() const {
     if (inner_level != 0) return inner_level;
+    // A block begins at bit 0, so there is one at `bit` or before.
+    ABSL_ASSERT((starts & UpTo(bit)) != 0);
     const unsigned first =
         63u - static_cast<unsigned>(std::countl_zero(starts & UpTo(bit)));
     // A shift by 64 is undefined, so by `first` and by one.

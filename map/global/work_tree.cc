@@ -4,6 +4,7 @@
 #include <cstring>
 #include <utility>
 
+#include "absl/base/macros.h"
 #include "map/global/fuse.h"
 
 namespace fathom::map {
@@ -12,6 +13,12 @@ WorkTile::WorkTile(const TileKey& its_key, const Leaf& leaf)
     : key(its_key), modified(true) {
   levels.fill(0);
   leaves[0] = leaf;
+}
+
+TileKey WorkNode::key() const {
+  if (const WorkTile* open = work.get()) return open->key;
+  ABSL_ASSERT(frozen != nullptr);
+  return frozen->key();
 }
 
 WorkTile::WorkTile(const Tile& tile) : key(tile.key()) {

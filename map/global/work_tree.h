@@ -29,6 +29,9 @@ struct WorkTile;
 struct WorkNode {
   std::shared_ptr<const Tile> frozen;
   std::unique_ptr<WorkTile> work;
+
+  // REQUIRES: one of the two is there.
+  TileKey key() const;
 };
 
 struct WorkTile {

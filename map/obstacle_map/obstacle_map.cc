@@ -358,13 +358,13 @@ absl::Status ObstacleMap::RestoreActivity(const StoredActivity& stored) {
 }
 
 absl::Status ObstacleMap::RestoreBlock(const ActivityId& id, BlockIndex index,
-                                       const LocalBlock& block) {
+                                       LocalBlock block) {
   const auto found = open_.find(id);
   if (found == open_.end()) {
     return absl::DataLossError(absl::StrFormat(
         "a stored block names activity_id=%s, which is not open", id.value));
   }
-  return found->second.local.RestoreBlock(index, block);
+  return found->second.local.RestoreBlock(index, std::move(block));
 }
 
 absl::Status ObstacleMap::RestoreContact(StoredContact stored) {

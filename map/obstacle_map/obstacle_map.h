@@ -129,7 +129,7 @@ class ObstacleMap {
   absl::Status RestoreTile(RestoredTile tile);
   absl::Status RestoreActivity(const StoredActivity& stored);
   absl::Status RestoreBlock(const ActivityId& id, BlockIndex index,
-                            const LocalBlock& block);
+                            LocalBlock block);
   absl::Status RestoreContact(StoredContact stored);
   void RestoreCounters(const MissionCounters& counters) {
     counters_ = counters;

@@ -82,6 +82,17 @@ double MeanRmse(const Window& window, const map::LocalMapView& view) {
   return std::sqrt(square / count);
 }
 
+// Calls visit(window, random) for each seed whose window the scene has.
+template <typename Visit>
+void ForEachWindow(const Scene& scene, int seeds, Visit visit) {
+  for (int seed = 1; seed <= seeds; ++seed) {
+    Random random(static_cast<std::uint64_t>(seed));
+    const auto window =
+        PickWindow(scene.terrain, scene.cell_m, scene.cells, random);
+    if (window) visit(*window, random);
+  }
+}
+
 }  // namespace
 
 nlohmann::json OptimalFigures(int seeds) {
@@ -113,17 +124,13 @@ nlohmann::json CoverageFigures(const std::vector<Scene>& scenes, int seeds) {
     for (const int hits : {1, 3, 10, 100}) {
       for (const EstimatorKind estimator : kEstimators) {
         Coverage coverage;
-        for (int seed = 1; seed <= seeds; ++seed) {
-          Random random(static_cast<std::uint64_t>(seed));
-          const auto window =
-              PickWindow(scene.terrain, scene.cell_m, scene.cells, random);
-          if (!window) continue;
+        ForEachWindow(scene, seeds, [&](const Window& window, Random& random) {
           const SurveyPlan plan{
               .estimator = estimator, .std_m = scene.std_m, .hits = hits};
-          map::LocalMap map = MakeSurvey(*window, plan, random);
-          Check(*window, map.View(), map::EvidenceKind::kMeasured, random,
+          map::LocalMap map = MakeSurvey(window, plan, random);
+          Check(window, map.View(), map::EvidenceKind::kMeasured, random,
                 coverage);
-        }
+        });
         nlohmann::json row = {{"scene", scene.name},
                               {"hits", hits},
                               {"estimator", EstimatorName(estimator)}};
@@ -140,20 +147,16 @@ nlohmann::json SmoothedFigures(const std::vector<Scene>& scenes, int seeds) {
   for (const Scene& scene : scenes) {
     for (const double covered : {0.1, 0.33}) {
       Coverage coverage;
-      for (int seed = 1; seed <= seeds; ++seed) {
-        Random random(static_cast<std::uint64_t>(seed));
-        const auto window =
-            PickWindow(scene.terrain, scene.cell_m, scene.cells, random);
-        if (!window) continue;
+      ForEachWindow(scene, seeds, [&](const Window& window, Random& random) {
         const SurveyPlan plan{.std_m = scene.std_m,
                               .hits = 3,
                               .covered = covered,
                               .smoothing_distance_cells = 2,
                               .smoothing_scale = 0.9};
-        map::LocalMap map = MakeSurvey(*window, plan, random);
-        Check(*window, map.View(), map::EvidenceKind::kSmoothed, random,
+        map::LocalMap map = MakeSurvey(window, plan, random);
+        Check(window, map.View(), map::EvidenceKind::kSmoothed, random,
               coverage);
-      }
+      });
       nlohmann::json row = {{"scene", scene.name}, {"covered", covered}};
       coverage.WriteTo(row);
       rows.push_back(row);
@@ -168,17 +171,13 @@ nlohmann::json BadPriorFigures(const std::vector<Scene>& scenes, int seeds) {
     for (const int hits : {1, 2, 3}) {
       double with = 0;
       double without = 0;
-      for (int seed = 1; seed <= seeds; ++seed) {
-        Random random(static_cast<std::uint64_t>(seed));
-        const auto window =
-            PickWindow(scene.terrain, scene.cell_m, scene.cells, random);
-        if (!window) continue;
+      ForEachWindow(scene, seeds, [&](const Window& window, Random& random) {
         SurveyPlan plan{.std_m = scene.std_m, .hits = hits};
         Random same = random;
-        map::LocalMap plain = MakeSurvey(*window, plan, random);
+        map::LocalMap plain = MakeSurvey(window, plan, random);
         const double middle_m = window
-                                    ->DepthAt(0.5 * scene.cells * scene.cell_m,
-                                              0.5 * scene.cells * scene.cell_m)
+                                    .DepthAt(0.5 * scene.cells * scene.cell_m,
+                                             0.5 * scene.cells * scene.cell_m)
                                     .value();
         plan.prior = [middle_m](const map::GeodeticPoint&) {
           return map::DepthEstimate{
@@ -186,10 +185,10 @@ nlohmann::json BadPriorFigures(const std::vector<Scene>& scenes, int seeds) {
               .std_m = 5,
               .kind = map::EvidenceKind::kPrior};
         };
-        map::LocalMap misled = MakeSurvey(*window, plan, same);
-        without += std::pow(MeanRmse(*window, plain.View()), 2);
-        with += std::pow(MeanRmse(*window, misled.View()), 2);
-      }
+        map::LocalMap misled = MakeSurvey(window, plan, same);
+        without += std::pow(MeanRmse(window, plain.View()), 2);
+        with += std::pow(MeanRmse(window, misled.View()), 2);
+      });
       rows.push_back({{"scene", scene.name},
                       {"hits", hits},
                       {"rmse_ratio", std::sqrt(with / without)}});

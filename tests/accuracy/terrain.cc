@@ -10,6 +10,15 @@
 #include "absl/strings/str_format.h"
 
 namespace fathom::accuracy {
+namespace {
+
+// Of a grid of `cols` columns, row by row.
+std::size_t IndexOf(int row, int col, int cols) {
+  return static_cast<std::size_t>(row) * static_cast<std::size_t>(cols) +
+         static_cast<std::size_t>(col);
+}
+
+}  // namespace
 
 absl::StatusOr<Terrain> Terrain::FromRaster(const std::string& path,
                                             bool elevation_up, double pixel_m) {
@@ -25,7 +34,7 @@ absl::StatusOr<Terrain> Terrain::FromRaster(const std::string& path,
   if (pixel_m <= 0) pixel_m = own_m;
   const int rows = dataset->GetRasterYSize();
   const int cols = dataset->GetRasterXSize();
-  std::vector<float> raw(static_cast<std::size_t>(rows) * cols);
+  std::vector<float> raw(IndexOf(rows, 0, cols));
   GDALRasterBand* band = dataset->GetRasterBand(1);
   if (band->RasterIO(GF_Read, 0, 0, cols, rows, raw.data(), cols, rows,
                      GDT_Float32, 0, 0) != CE_None) {
@@ -37,13 +46,13 @@ absl::StatusOr<Terrain> Terrain::FromRaster(const std::string& path,
   std::vector<float> depths(raw.size());
   for (int row = 0; row < rows; ++row) {
     for (int col = 0; col < cols; ++col) {
-      const float value = raw[static_cast<std::size_t>(row) * cols + col];
+      const float value = raw[IndexOf(row, col, cols)];
       float depth = elevation_up ? -value : value;
       if ((has_nodata != 0 && value == static_cast<float>(nodata)) ||
           !(depth > 0)) {
         depth = std::numeric_limits<float>::quiet_NaN();
       }
-      depths[static_cast<std::size_t>(rows - 1 - row) * cols + col] = depth;
+      depths[IndexOf(rows - 1 - row, col, cols)] = depth;
     }
   }
   return Terrain(rows, cols, pixel_m, std::move(depths));
@@ -52,17 +61,17 @@ absl::StatusOr<Terrain> Terrain::FromRaster(const std::string& path,
 Terrain Terrain::Fractal(std::uint64_t seed, double pixel_m,
                          double mean_depth_m, double relief_m) {
   constexpr int kNodes = 256;
-  std::vector<float> depths(static_cast<std::size_t>(kNodes) * kNodes,
+  std::vector<float> depths(IndexOf(kNodes, 0, kNodes),
                             static_cast<float>(mean_depth_m));
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
   double amplitude_m = relief_m;
   for (int spacing = 64; spacing >= 1; spacing /= 2, amplitude_m /= 2) {
     const int knots = kNodes / spacing + 2;
-    std::vector<double> values(static_cast<std::size_t>(knots) * knots);
+    std::vector<double> values(IndexOf(knots, 0, knots));
     for (double& value : values) value = amplitude_m * normal(random);
     const auto knot = [&](int row, int col) {
-      return values[static_cast<std::size_t>(row) * knots + col];
+      return values[IndexOf(row, col, knots)];
     };
     for (int row = 0; row < kNodes; ++row) {
       for (int col = 0; col < kNodes; ++col) {
@@ -70,10 +79,9 @@ Terrain Terrain::Fractal(std::uint64_t seed, double pixel_m,
         const int j = col / spacing;
         const double a = static_cast<double>(row % spacing) / spacing;
         const double b = static_cast<double>(col % spacing) / spacing;
-        depths[static_cast<std::size_t>(row) * kNodes + col] +=
-            static_cast<float>(
-                (1 - a) * ((1 - b) * knot(i, j) + b * knot(i, j + 1)) +
-                a * ((1 - b) * knot(i + 1, j) + b * knot(i + 1, j + 1)));
+        depths[IndexOf(row, col, kNodes)] += static_cast<float>(
+            (1 - a) * ((1 - b) * knot(i, j) + b * knot(i, j + 1)) +
+            a * ((1 - b) * knot(i + 1, j) + b * knot(i + 1, j + 1)));
       }
     }
   }

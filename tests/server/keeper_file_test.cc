@@ -15,6 +15,7 @@
 #include "server/mission.h"
 #include "tests/server/keeper_fakes.h"
 #include "tests/server/keeper_messages.h"
+#include "tests/server/open_keeper.h"
 #include "tests/server/sample_map.h"
 #include "tests/storage/temp_dir.h"
 #include "tests/testing/status_matchers.h"
@@ -26,23 +27,6 @@ using ::fathom::testing::IsOk;
 
 class KeeperFileTest : public ::testing::Test {
  protected:
-  struct Open {
-    std::unique_ptr<storage::MissionFile> file;
-    std::unique_ptr<MissionFileStore> store;
-    std::unique_ptr<MapKeeper> keeper;
-  };
-
-  Open OpenKeeper(std::unique_ptr<storage::MissionFile> file) {
-    Open open;
-    open.file = std::move(file);
-    open.store = std::make_unique<MissionFileStore>(*open.file);
-    auto restored = RestoreMission(*open.file);
-    EXPECT_THAT(restored, IsOk());
-    open.keeper = std::make_unique<MapKeeper>(*std::move(restored), *open.store,
-                                              KeeperOptions{});
-    return open;
-  }
-
   // Something of everything; what it leaves open is in the journal.
   void Fill(MapKeeper& keeper) {
     Awaited<ImportedTile> imported;

@@ -12,6 +12,7 @@
 #include "server/mission.h"
 #include "tests/server/keeper_fakes.h"
 #include "tests/server/keeper_messages.h"
+#include "tests/server/open_keeper.h"
 #include "tests/server/sample_map.h"
 #include "tests/storage/temp_dir.h"
 #include "tests/testing/status_matchers.h"
@@ -56,24 +57,6 @@ float StdOf(MapKeeper& keeper, uint64_t number) {
 
 class KeeperImportTest : public ::testing::Test {
  protected:
-  struct Open {
-    std::unique_ptr<storage::MissionFile> file;
-    std::unique_ptr<MissionFileStore> store;
-    std::unique_ptr<MapKeeper> keeper;
-  };
-
-  Open OpenKeeper(absl::StatusOr<std::unique_ptr<storage::MissionFile>> file) {
-    EXPECT_THAT(file, IsOk());
-    Open open;
-    open.file = *std::move(file);
-    open.store = std::make_unique<MissionFileStore>(*open.file);
-    auto restored = RestoreMission(*open.file);
-    EXPECT_THAT(restored, IsOk());
-    open.keeper = std::make_unique<MapKeeper>(*std::move(restored), *open.store,
-                                              KeeperOptions{});
-    return open;
-  }
-
   Open New() {
     NewMission mission;
     mission.center = map::GeodeticPoint{41.5, -71.4};
