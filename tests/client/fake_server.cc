@@ -242,7 +242,7 @@ grpc::Status FakeServer::QueryObstacles(
 grpc::Status FakeServer::GetRegion(
     grpc::ServerContext*, const v1::GetRegionRequest*,
     grpc::ServerWriter<v1::GetRegionResponse>* writer) {
-  const grpc::Status status = Enter("GetRegion");
+  grpc::Status status = Enter("GetRegion");
   if (!status.ok()) return status;
   for (const v1::GetRegionResponse& message : region) writer->Write(message);
   return grpc::Status::OK;
@@ -252,7 +252,7 @@ grpc::Status FakeServer::StreamPings(
     grpc::ServerContext* context,
     grpc::ServerReaderWriter<v1::StreamPingsResponse, v1::StreamPingsRequest>*
         stream) {
-  const grpc::Status status = Enter("StreamPings");
+  grpc::Status status = Enter("StreamPings");
   if (!status.ok()) return status;
   const auto get = [](const v1::StreamPingsRequest& request) -> const auto& {
     return request.ping();
@@ -264,7 +264,7 @@ grpc::Status FakeServer::StreamContacts(
     grpc::ServerContext* context,
     grpc::ServerReaderWriter<v1::StreamContactsResponse,
                              v1::StreamContactsRequest>* stream) {
-  const grpc::Status status = Enter("StreamContacts");
+  grpc::Status status = Enter("StreamContacts");
   if (!status.ok()) return status;
   const auto get = [](const v1::StreamContactsRequest& request) -> const auto& {
     return request.report();
@@ -297,7 +297,7 @@ grpc::Status FakeServer::GetImport(grpc::ServerContext*,
 grpc::Status FakeServer::ImportPrior(
     grpc::ServerContext*, grpc::ServerReader<v1::ImportPriorRequest>* reader,
     v1::ImportPriorResponse* response) {
-  const grpc::Status status = Enter("ImportPrior");
+  grpc::Status status = Enter("ImportPrior");
   if (!status.ok()) return status;
   v1::ImportPriorRequest request;
   while (reader->Read(&request)) {

@@ -17,12 +17,6 @@
 #include "client/cli/relief_shading.h"
 #include "tests/testing/status_matchers.h"
 
-// Fontconfig keeps a few hundred bytes for the life of the process; the leak
-// checker asks this function, which nothing else calls.
-extern "C" const char* __lsan_default_suppressions() {  // NOLINT
-  return "leak:libfontconfig\n";
-}
-
 namespace fathom::client::cli {
 namespace {
 

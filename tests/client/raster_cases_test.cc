@@ -29,8 +29,6 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-
 // Everything of a raster, read in blocks.
 struct Whole {
   std::vector<float> depths;  // Known ones.
@@ -255,7 +253,7 @@ class RasterCases : public ::testing::Test {
   std::string MakeCounted(int columns, int rows,
                           const std::array<double, 6>& geotransform,
                           const std::string& crs) {
-    const std::string path = folder_ / "counted.tif";
+    std::string path = folder_ / "counted.tif";
     auto* dataset = GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
         path.c_str(), columns, rows, 1, GDT_Float32, nullptr);
     dataset->SetGeoTransform(
@@ -413,7 +411,7 @@ TEST_F(RasterCases, TurnedSignIsRefusedNotLoadedAsLand) {
 
 // A sparse file of 100 000 x 100 000 cells (40 GB if it were stored).
 std::string MakeHuge(const std::filesystem::path& folder, bool with_rock) {
-  const std::string path = folder / "huge.tif";
+  std::string path = folder / "huge.tif";
   char** options = nullptr;
   options = CSLSetNameValue(options, "SPARSE_OK", "TRUE");
   options = CSLSetNameValue(options, "TILED", "YES");

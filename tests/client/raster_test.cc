@@ -56,7 +56,7 @@ class RasterTest : public ::testing::Test {
   };
 
   std::string Make(const Made& made, const std::string& name = "made.tif") {
-    const std::string path = folder_ / name;
+    std::string path = folder_ / name;
     GDALDataset* dataset =
         GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
             path.c_str(), made.columns, made.rows,

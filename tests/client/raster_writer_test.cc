@@ -21,7 +21,6 @@
 namespace fathom::client::cli {
 namespace {
 
-using ::fathom::testing::IsOk;
 using ::fathom::testing::StatusIs;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;

@@ -20,7 +20,6 @@
 namespace fathom::client::cli {
 namespace {
 
-using ::fathom::testing::IsOk;
 using ::fathom::testing::IsOkAndHolds;
 using ::fathom::testing::StatusIs;
 using ::testing::DoubleNear;

@@ -72,7 +72,8 @@ void FillPing(std::mt19937_64& random, v1::Ping& ping) {
   ping.mutable_pose()->set_heading_deg(Uniform(random, 0, 360));
   for (int beam = 0; beam < kBeams; ++beam) {
     // A swath across the track, 1.5 m from beam to beam.
-    const float across_m = 1.5f * static_cast<float>(beam - kBeams / 2);
+    constexpr int kMiddle = kBeams / 2;
+    const float across_m = 1.5f * static_cast<float>(beam - kMiddle);
     ping.add_range_m(std::abs(across_m) + 0.5f);
     ping.add_bearing_deg(across_m < 0 ? -90.0f : 90.0f);
     ping.add_depth_m(static_cast<float>(Uniform(random, 18, 22)));
