@@ -57,13 +57,11 @@ void EvidenceCells::MarkTransferred() {
 
 void EvidenceCells::Restore(std::size_t k, const PackedEvidence& fresh,
                             const PackedEvidence* transferred) {
-  if (transferred != nullptr) {
-    transferred_.resize(size());
-    Mutable(k) = fresh;
-    transferred_[slots_[k]] = *transferred;
-  } else {
-    Mutable(k) = fresh;
-  }
+  Mutable(k) = fresh;
+  if (transferred == nullptr) return;
+  transferred_.reserve(RoomFor(size()));
+  transferred_.resize(size());
+  transferred_[slots_[k]] = *transferred;
 }
 
 PackedEvidence& EvidenceCells::Touch(std::size_t k) {

@@ -166,11 +166,11 @@ TEST(BlockCodec, TransferredPriorsAndNervegnaComeBack) {
 }
 
 TEST(BlockCodec, UntouchedCellsTakeNoRoom) {
-  // Header 8, key 8, flags 1, prior 13, mask 32: 62; one touched cell adds its
-  // 24 planes of one element, two bytes each: 110.
+  // Header 8, key 8, flags 1, prior 13, window 4, mask 32: 66; one touched cell
+  // adds its 20 planes of one element, two bytes each: 106.
   const BlockKey key{.activity_number = 1, .index = {}};
-  EXPECT_EQ(EncodeBlock(key, SampleBlock(0)).size(), 62u);
-  EXPECT_EQ(EncodeBlock(key, SampleBlock(1)).size(), 110u);
+  EXPECT_EQ(EncodeBlock(key, SampleBlock(0)).size(), 66u);
+  EXPECT_EQ(EncodeBlock(key, SampleBlock(1)).size(), 106u);
 }
 
 TEST(BlockCodec, DamageNeverCrashes) {

@@ -179,6 +179,14 @@ TEST(EvidenceCells, ACellStaysMeasuredWhenItsEvidenceIsTransferred) {
   EXPECT_EQ(cells.Transferred(6).mean_m, 23.0f);
   EXPECT_EQ(cells.CountFresh(), 0u);
   EXPECT_EQ(cells, EvidenceCells(cells));
+
+  EvidenceCells restored;
+  restored.set_window_s(cells.window_s());
+  for (const std::size_t k : {6u, 4u, 5u}) {
+    restored.Restore(k, *cells.Find(k), cells.FindTransferred(k));
+  }
+  EXPECT_EQ(restored, cells);
+  EXPECT_EQ(restored.memory_bytes(), cells.memory_bytes());
 }
 
 }  // namespace
