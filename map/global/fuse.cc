@@ -15,11 +15,6 @@ constexpr double kChanceSigmas = 2.0;
 // A little less than kFreeSigmas, so that a rounded std does not matter.
 constexpr double kNotFreeSigmas = 1.6;
 
-// The normal quantile of 1 - 0.01 / n: within 0.03 for n from 2 to 1000.
-double LeastOfNormals(double n) {
-  return std::sqrt(2.0 * std::log(50.0 * n)) - 0.45;
-}
-
 // The depth from which downward an answer from this alone is not FREE.
 float NotFreeFrom(const CellEvidence& part) {
   return static_cast<float>(

@@ -111,7 +111,7 @@ class EvidenceCells {
   // Hints that Add(k) is near: first the one, some time later the other.
   void PrefetchPlace(std::size_t k) const { __builtin_prefetch(&slots_[k]); }
   void PrefetchCell(std::size_t k) const {
-    __builtin_prefetch(fresh_.data() + slots_[k], /*for writing*/ 1);
+    if (touched(k)) __builtin_prefetch(&fresh_[slots_[k]], /*for writing*/ 1);
   }
   // Replaces the cell's fresh evidence and says whether it was ever measured.
   void Set(std::size_t k, const Evidence& evidence, bool measured) {

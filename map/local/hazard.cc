@@ -3,15 +3,12 @@
 #include <cmath>
 #include <limits>
 
+#include "map/geodesy/depth_fusion.h"
+
 namespace fathom::map {
 namespace {
 
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-
-// The normal quantile of 1 - 0.01 / n: within 0.03 for n from 2 to 1000.
-float LeastOfNormals(float n) {
-  return std::sqrt(2.0f * std::log(50.0f * n)) - 0.45f;
-}
 
 }  // namespace
 
@@ -33,7 +30,9 @@ float HazardDepth(const Evidence& evidence) {
         (evidence.mean_m - evidence.shoalest_m) * n / (n - 1.0f);
     // LeastOfNormals is never below 2.5: most cells need no logarithm.
     if (above_m <= 2.5f * stated_m) return kNone;
-    if (above_m <= LeastOfNormals(n) * stated_m) return kNone;
+    if (above_m <= static_cast<float>(LeastOfNormals(n)) * stated_m) {
+      return kNone;
+    }
   }
   return evidence.shoalest_m - kHazardMarginStd * stated_m;
 }

@@ -9,6 +9,7 @@
 #include <random>
 #include <utility>
 
+#include "map/geodesy/depth_fusion.h"
 #include "map/local/local_grid.h"
 #include "tests/map/local/local_test_map.h"
 
@@ -29,6 +30,18 @@ Evidence Soundings(std::initializer_list<float> depths_m, float std_m) {
   Evidence evidence;
   for (const float depth_m : depths_m) evidence.Add(depth_m, std_m, 1);
   return evidence;
+}
+
+TEST(LeastOfNormals, IsTheNormalQuantileOfOneHundredthOfOneInN) {
+  for (const double n : {2.0, 3.0, 10.0, 100.0, 1000.0}) {
+    double low = 0.0, high = 10.0;
+    for (int step = 0; step < 60; ++step) {
+      const double middle = 0.5 * (low + high);
+      const bool rarer = 0.5 * std::erfc(middle / std::sqrt(2.0)) < 0.01 / n;
+      (rarer ? high : low) = middle;
+    }
+    EXPECT_NEAR(LeastOfNormals(n), low, 0.03) << n;
+  }
 }
 
 TEST(HazardDepth, IsFourAndAHalfStdAboveARockThatNoiseDoesNotExplain) {
