@@ -64,9 +64,10 @@ inline double FuseVarianceNervegna(double k, double variance_1, double mean_1,
 MeanVariance FusePrior(const MeanVariance& evidence, std::uint32_t soundings,
                        double prior_mean_m, double prior_variance_m2);
 
-// How many std the least of n independent normal draws lies below their mean at
-// most, but for once in a hundred sets of n: the normal quantile of 1 - 0.01 /
-// n (Bonferroni), within 0.03 for n from 2 to 1000. Shoaler is no chance.
+// How many std the least of n independent normal draws lies below their mean
+// at most, but for once in a hundred sets of n: the normal quantile of 1 - 0.01
+// / n (Bonferroni). Within 0.03 for n up to 30, and up to 0.07 less for n up to
+// 1000, so that a little more counts as no chance: the safe side.
 inline double LeastOfNormals(double n) {
   return std::sqrt(2.0 * std::log(50.0 * n)) - 0.45;
 }
