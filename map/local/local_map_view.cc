@@ -148,7 +148,7 @@ constexpr std::int32_t kRoughnessRings = 4;
 
 // Cells in the first `rings` rings about a cell.
 constexpr std::size_t CellsWithin(std::int32_t rings) {
-  const auto side = static_cast<std::size_t>(2 * rings + 1);
+  const std::size_t side = 2 * static_cast<std::size_t>(rings) + 1;
   return side * side - 1;
 }
 

@@ -82,7 +82,7 @@ TEST_F(KeeperImportTest, ARepeatedTileIsSkipped) {
   ASSERT_THAT(Import(keeper, 2, true), IsOk());
   EXPECT_EQ(Held(keeper), 2U);
   const std::string digest = keeper.View()->Digest();
-  for (const uint64_t number : {1, 2}) {
+  for (const uint64_t number : {1u, 2u}) {
     FATHOM_ASSERT_OK_AND_ASSIGN(const auto again,
                                 Import(keeper, number, number == 2));
     EXPECT_TRUE(again.result.skipped);

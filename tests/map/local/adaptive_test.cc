@@ -50,8 +50,9 @@ TEST(VariabilityAround, APlaneVariesByItsStepsSquaredOverTwelve) {
   std::array<PackedEvidence, 9> plane;
   Neighbourhood cells;
   for (std::size_t k = 0; k < 9; ++k) {
+    const std::size_t row = k / 3;
     const float depth_m =
-        20.0f + 2.0f * static_cast<float>(k / 3) + static_cast<float>(k % 3);
+        20.0f + 2.0f * static_cast<float>(row) + static_cast<float>(k % 3);
     Evidence evidence;
     for (int n = 0; n < 10000; ++n) evidence.Add(depth_m, 0.01f, 1);
     plane[k] = PackMoments(evidence);
@@ -260,7 +261,8 @@ Coverage CoverageOnASlope(double slope, double azimuth_rad, int hits,
   constexpr int kSide = 12;
   for (int hit = 0; hit < hits; ++hit) {
     for (int k = 0; k < kSide * kSide; ++k) {
-      const double north_m = 10.0 * (k / kSide) + inside(random);
+      const int row = k / kSide;
+      const double north_m = 10.0 * row + inside(random);
       const double east_m = 10.0 * (k % kSide) + inside(random);
       map.Update(PingAt(options, north_m, east_m,
                         static_cast<float>(truth_m(north_m, east_m) +
@@ -273,10 +275,10 @@ Coverage CoverageOnASlope(double slope, double azimuth_rad, int hits,
   Coverage coverage;
   constexpr int kProbes = 200;
   for (int k = 0; k < kSide * kSide; ++k) {
-    const DepthEstimate estimate =
-        *view.AtCell({.i = k / kSide, .j = k % kSide});
+    const int row = k / kSide;
+    const DepthEstimate estimate = *view.AtCell({.i = row, .j = k % kSide});
     for (int probe = 0; probe < kProbes; ++probe) {
-      const double error_m = truth_m(10.0 * (k / kSide) + inside(random),
+      const double error_m = truth_m(10.0 * row + inside(random),
                                      10.0 * (k % kSide) + inside(random)) -
                              estimate.depth_m;
       for (int n = 0; n < 3; ++n) {

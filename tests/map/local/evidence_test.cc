@@ -58,7 +58,7 @@ TEST(Evidence, AnyOrderAndGroupingGiveTheSameUpToRounding) {
     const double w = 1.0 / (double{one.std_m} * one.std_m);
     scatter += w * std::pow(one.depth_m - sum / weight, 2);
   }
-  for (int shuffle = 0; shuffle < 50; ++shuffle) {
+  for (std::size_t shuffle = 0; shuffle < 50; ++shuffle) {
     std::shuffle(soundings.begin(), soundings.end(), random);
     std::vector<Evidence> parts(1 + shuffle % 7);
     for (std::size_t k = 0; k < soundings.size(); ++k) {

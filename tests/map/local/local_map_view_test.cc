@@ -133,7 +133,7 @@ TEST(LocalMapView, MeasuredAreasAreBlocksCutAtTheBorder) {
     EXPECT_EQ(cells, 2u);
     const double expected[4][2] = {
         {480.0, 480.0}, {500.0, 480.0}, {500.0, 500.0}, {480.0, 500.0}};
-    for (int k = 0; k < 4; ++k) {
+    for (std::size_t k = 0; k < 4; ++k) {
       const NedPoint at = view.frame().ToNed(corners[k]);
       EXPECT_NEAR(at.north_m, expected[k][0], 1e-6);
       EXPECT_NEAR(at.east_m, expected[k][1], 1e-6);
