@@ -94,7 +94,6 @@ bool IsFree(const map::DepthEstimate& estimate, double depth_m) {
 }
 
 Cost CostOf(const Scene& scene, int hits, int seed) {
-  constexpr int kQuestionsPerCell = 4;
   Cost cost;
   Random random(static_cast<std::uint64_t>(1000 * seed + hits));
   const auto window =
@@ -103,30 +102,23 @@ Cost CostOf(const Scene& scene, int hits, int seed) {
   const SurveyPlan plan{.std_m = scene.std_m, .hits = hits};
   map::LocalMap map = MakeSurvey(*window, plan, random);
   const map::LocalMapView view = map.View();
-  // As ReliabilityFigures asks.
-  std::uniform_real_distribution<double> above_m(-4 * scene.std_m - 0.5,
-                                                 4 * scene.std_m + 0.5);
   for (int i = 0; i < window->cells; ++i) {
     for (int j = 0; j < window->cells; ++j) {
       const auto estimate = view.AtCell({.i = i, .j = j});
       if (!estimate) continue;
-      map::DepthEstimate plain = *estimate;
-      plain.hazard_m = std::numeric_limits<float>::quiet_NaN();
       ++cost.cells;
       cost.with_hazard += !std::isnan(estimate->hazard_m);
-      for (int n = 0; n < kQuestionsPerCell; ++n) {
-        const Place at = RandomPlace(*window, i, j, random);
-        const Place level = RandomPlace(*window, i, j, random);
-        const double depth_m =
-            window->DepthAt(level.north_m, level.east_m).value() +
-            above_m(random);
-        if (window->DepthAt(at.north_m, at.east_m).value() <= depth_m) continue;
-        ++cost.water;
-        if (!IsFree(plain, depth_m)) continue;
-        ++(IsFree(*estimate, depth_m) ? cost.free : cost.lost);
-      }
     }
   }
+  ForEachQuestion(
+      *window, view, scene.std_m, random, [&cost](const Question& question) {
+        if (question.truth_m <= question.depth_m) return;
+        ++cost.water;
+        map::DepthEstimate plain = question.estimate;
+        plain.hazard_m = std::numeric_limits<float>::quiet_NaN();
+        if (!IsFree(plain, question.depth_m)) return;
+        ++(IsFree(question.estimate, question.depth_m) ? cost.free : cost.lost);
+      });
   return cost;
 }
 

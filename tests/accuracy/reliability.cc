@@ -79,7 +79,6 @@ nlohmann::json ReliabilityFigures(const std::vector<Scene>& scenes, int seeds) {
   constexpr std::array kEstimators = {EstimatorKind::kAdaptive,
                                       EstimatorKind::kNervegna,
                                       EstimatorKind::kKalman};
-  constexpr int kQuestionsPerCell = 4;
   const map::ContactsView no_contacts;
   auto rows = nlohmann::json::array();
   std::array<Tally, 3> all;
@@ -96,33 +95,20 @@ nlohmann::json ReliabilityFigures(const std::vector<Scene>& scenes, int seeds) {
           const SurveyPlan plan{
               .estimator = kEstimators[e], .std_m = scene.std_m, .hits = hits};
           map::LocalMap map = MakeSurvey(*window, plan, random);
-          const map::LocalMapView view = map.View();
-          std::uniform_real_distribution<double> above_m(-4 * scene.std_m - 0.5,
-                                                         4 * scene.std_m + 0.5);
-          for (int i = 0; i < window->cells; ++i) {
-            for (int j = 0; j < window->cells; ++j) {
-              const auto estimate = view.AtCell({.i = i, .j = j});
-              if (!estimate) continue;
-              for (int n = 0; n < kQuestionsPerCell; ++n) {
-                const Place at = RandomPlace(*window, i, j, random);
-                // About the floor elsewhere in the cell: independent of the
-                // map and of the point that is asked about.
-                const Place level = RandomPlace(*window, i, j, random);
-                const double truth_m =
-                    window->DepthAt(at.north_m, at.east_m).value();
+          ForEachQuestion(
+              *window, map.View(), scene.std_m, random,
+              [&](const Question& question) {
                 map::ObstacleQuery query;
-                query.depth_m =
-                    window->DepthAt(level.north_m, level.east_m).value() +
-                    above_m(random);
+                query.depth_m = question.depth_m;
                 const map::ObstacleAnswer answer = map::Answer(
                     query,
-                    map::SeabedEstimate{.estimate = *estimate, .local = true},
+                    map::SeabedEstimate{.estimate = question.estimate,
+                                        .local = true},
                     no_contacts);
-                tallies[e].Add(answer, truth_m <= query.depth_m);
-                all[e].Add(answer, truth_m <= query.depth_m);
-              }
-            }
-          }
+                const bool solid = question.truth_m <= question.depth_m;
+                tallies[e].Add(answer, solid);
+                all[e].Add(answer, solid);
+              });
         }
       }
     }

@@ -113,4 +113,28 @@ map::LocalMap MakeSurvey(const Window& window, const SurveyPlan& plan,
   return map;
 }
 
+void ForEachQuestion(const Window& window, const map::LocalMapView& view,
+                     double std_m, Random& random,
+                     const std::function<void(const Question&)>& ask) {
+  constexpr int kQuestionsPerCell = 4;
+  const double most_m = 4 * std_m + 0.5;
+  std::uniform_real_distribution<double> above_m(-most_m, most_m);
+  for (int i = 0; i < window.cells; ++i) {
+    for (int j = 0; j < window.cells; ++j) {
+      const auto estimate = view.AtCell({.i = i, .j = j});
+      if (!estimate) continue;
+      for (int n = 0; n < kQuestionsPerCell; ++n) {
+        const Place at = RandomPlace(window, i, j, random);
+        const Place level = RandomPlace(window, i, j, random);
+        const double truth_m = window.DepthAt(at.north_m, at.east_m).value();
+        const double floor_m =
+            window.DepthAt(level.north_m, level.east_m).value();
+        ask({.estimate = *estimate,
+             .truth_m = truth_m,
+             .depth_m = floor_m + above_m(random)});
+      }
+    }
+  }
+}
+
 }  // namespace fathom::accuracy

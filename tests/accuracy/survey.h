@@ -80,6 +80,21 @@ std::uint32_t Feed(const std::vector<Sounding>& soundings,
 map::LocalMap MakeSurvey(const Window& window, const SurveyPlan& plan,
                          Random& random);
 
+// A depth that is asked about at a place of known truth; metres.
+struct Question {
+  map::DepthEstimate estimate;  // Of the place's cell.
+  double truth_m = 0;
+  double depth_m = 0;
+};
+
+// Asks four questions about each cell that the map has an estimate of: at
+// random places, at depths up to four stated std and half a metre above and
+// below the floor elsewhere in the cell - independent of the map and of the
+// place.
+void ForEachQuestion(const Window& window, const map::LocalMapView& view,
+                     double std_m, Random& random,
+                     const std::function<void(const Question&)>& ask);
+
 }  // namespace fathom::accuracy
 
 #endif  // FATHOM_TESTS_ACCURACY_SURVEY_H_
