@@ -38,7 +38,7 @@ struct CellEvidence {
 // to be FREE. With d its distance from the joined mean, v the variance of its
 // mean and w that of the parts' means about the joined one, not explained is
 // d^2 > q_n^2 v + 1.6^2 w, q_n the bound that the least of n normal draws
-// passes once in a hundred cells (map/local/hazard.h).
+// passes once in a hundred cells (LeastOfNormals).
 class EvidenceSum {
  public:
   void Add(const CellEvidence& evidence);
