@@ -1,9 +1,13 @@
 // fathomd: the obstacle-map server. Opens (or makes) a mission file, serves it
 // until SIGTERM or SIGINT, and leaves it closed cleanly.
 //
-// Exit codes: 0 stopped as asked; 1 could not start, or the mission file
-// failed while serving (the reason is the last line on standard error); 2
-// flags that make no sense.
+// Exit codes (the reason is the last line on standard error):
+//   0  stopped as asked
+//   1  could not start; nothing was changed
+//   2  flags that make no sense
+//   3  the mission file could not be written while serving (an I/O error, or
+//      the disk was still full at the end): what was acknowledged is in it,
+//      what was not must be sent again. A supervisor should start it again.
 
 #include <pthread.h>
 #include <signal.h>
@@ -17,6 +21,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/strings/str_format.h"
@@ -32,6 +37,10 @@
 
 namespace fathom::server {
 namespace {
+
+constexpr int kExitCannotStart = 1;
+constexpr int kExitMisuse = 2;
+constexpr int kExitFileFailed = 3;
 
 constexpr double kMetresPerNmi = 1852;  // Exact, by definition.
 
@@ -50,7 +59,10 @@ and answers "is there an obstacle at this place, time and confidence?".
 
 When it serves, it prints one line on standard output:
   fathomd: ready on ADDR mission FILE revision N
-SIGTERM drains it: streams end when what they sent is on the disk.)";
+SIGTERM drains it: streams end when what they sent is on the disk.
+
+Exit codes: 0 stopped as asked, 1 could not start, 2 wrong flags, 3 the mission
+file could not be written while serving (nothing acknowledged is lost).)";
 
 struct Flags {
   std::string mission_path;
@@ -207,7 +219,8 @@ class NewFileGuard {
   std::string path_;
 };
 
-absl::Status Serve(Flags& flags) {
+// Sets `file_failed` if the mission file stood in the way of what was taken in.
+absl::Status Serve(Flags& flags, bool& file_failed) {
   FATHOM_RETURN_IF_ERROR(CheckListenOptions(flags.listen));
   const sigset_t signals = BlockEndSignals();
   // A client that goes away is an error of its call, not of the program.
@@ -222,6 +235,10 @@ absl::Status Serve(Flags& flags) {
   FATHOM_ASSIGN_OR_RETURN(MapKeeper::Restored restored, RestoreMission(*file));
   Log(LogLevel::kInfo, "mission opened path=%s revision=%d replayed=%d",
       flags.mission_path, restored.map->revision(), restored.journal_records);
+  for (const std::string& damage : restored.damage) {
+    Log(LogLevel::kError, "left out, its place is unknown: %s", damage);
+  }
+  const std::vector<std::string> damage = restored.damage;
 
   std::atomic<bool> failed{false};
   KeeperOptions options;
@@ -233,7 +250,8 @@ absl::Status Serve(Flags& flags) {
   };
   MissionFileStore store(*file);
   MapKeeper keeper(std::move(restored), store, std::move(options));
-  ServerContext context{.keeper = keeper, .file = *file, .clock = clock};
+  ServerContext context{
+      .keeper = keeper, .file = *file, .clock = clock, .damage = damage};
   FATHOM_ASSIGN_OR_RETURN(const auto server,
                           Server::Start(flags.listen, context));
   if (!flags.port_file.empty()) {
@@ -252,6 +270,7 @@ absl::Status Serve(Flags& flags) {
   const absl::Status stopped = keeper.Stop();
   const absl::Status closed = file->Close();
   if (failed || !stopped.ok()) {
+    file_failed = true;
     return absl::Status(stopped.code(),
                         absl::StrFormat("not everything could be written "
                                         "(nothing acknowledged is lost): %s",
@@ -271,19 +290,21 @@ int Main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+    return app.exit(error) == 0 ? 0 : kExitMisuse;
   }
   const auto level = ParseLogLevel(flags.log_level);
   if (!level.ok()) {
     absl::FPrintF(stderr, "fathomd: --log-level: %s\n",
                   std::string(level.status().message()));
-    return 2;
+    return kExitMisuse;
   }
   InitLog("fathomd", *level);
-  const absl::Status status = Serve(flags);
+  bool file_failed = false;
+  const absl::Status status = Serve(flags, file_failed);
   if (status.ok()) return 0;
   absl::FPrintF(stderr, "fathomd: %s\n", std::string(status.message()));
-  return absl::IsInvalidArgument(status) ? 2 : 1;
+  if (file_failed) return kExitFileFailed;
+  return absl::IsInvalidArgument(status) ? kExitMisuse : kExitCannotStart;
 }
 
 }  // namespace

@@ -123,6 +123,8 @@ class MapKeeper {
     SourceLedger ledger;
     // Records that were replayed.
     size_t journal_records = 0;
+    // What could not be read and was left out, for people.
+    std::vector<std::string> damage;
   };
 
   // Starts the threads. `store` must outlive the keeper.

@@ -113,6 +113,7 @@ absl::StatusOr<MapKeeper::Restored> RestoreMission(storage::MissionFile& file) {
                             {position.epoch, position.sequence});
   }
   restored.journal_records = loaded.journal.size();
+  restored.damage = std::move(loaded.damage);
   FATHOM_ASSIGN_OR_RETURN(storage::RestoredMap map,
                           storage::RestoreMap(std::move(loaded), options));
   restored.map = std::move(map.map);

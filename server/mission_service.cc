@@ -1,9 +1,12 @@
 #include "server/mission_service.h"
 
 #include <chrono>
+#include <filesystem>
 #include <functional>
+#include <string_view>
 #include <utility>
 
+#include "absl/strings/str_format.h"
 #include "server/convert_common.h"
 #include "server/convert_mission.h"
 #include "server/field_checks.h"
@@ -35,6 +38,31 @@ Done<Result> Answer(ServerContext& context, grpc::ServerUnaryReactor* reactor,
 absl::Status CheckActivityId(const std::string& id) {
   const FieldPath root;
   return CheckId(id, FieldPath(root, "activity_id"));
+}
+
+// Of StorageStatus.damage.
+constexpr int kMaxDamageTold = 100;
+
+// A name in the mission's own folder that neither hides nor stands for what
+// belongs to a mission (docs/storage_format.md, "Files").
+absl::Status CheckFileName(const std::string& name, const FieldPath& path) {
+  if (name.empty() || name.size() > kMaxNameLength || name.front() == '.' ||
+      name.find_first_of(std::string_view("/\0", 2)) != std::string::npos) {
+    return InvalidField(
+        path.ToString(),
+        absl::StrFormat("must be a file name of 1 to %d bytes without "
+                        "directories that does not begin with a dot",
+                        kMaxNameLength));
+  }
+  for (const std::string_view end : {"-wal", "-shm", ".lock", ".new"}) {
+    if (std::string_view(name).ends_with(end)) {
+      return InvalidField(path.ToString(),
+                          absl::StrFormat("ends in %s, which stands for a part "
+                                          "of a mission",
+                                          end));
+    }
+  }
+  return absl::OkStatus();
 }
 
 double SecondsSince(std::chrono::steady_clock::time_point start) {
@@ -171,6 +199,10 @@ grpc::ServerUnaryReactor* MissionService::GetMissionStatus(
   storage->set_journal_records(state.journal_records);
   storage->set_durable_revision(state.durable_revision);
   storage->set_fault(state.fault);
+  for (const std::string& damage : context_.damage) {
+    if (storage->damage_size() >= kMaxDamageTold) break;
+    storage->add_damage(damage);
+  }
   WriteLimits(response->mutable_limits());
   if (!request->with_digest()) return Reply(call, absl::OkStatus());
   // Reads the whole map: not on a thread that other calls need.
@@ -198,15 +230,53 @@ grpc::ServerUnaryReactor* MissionService::DropContact(
 }
 
 grpc::ServerUnaryReactor* MissionService::SaveMission(
-    grpc::CallbackServerContext* call, const v1::SaveMissionRequest*,
-    v1::SaveMissionResponse*) {
-  return Reply(call, NotYet("SaveMission"));
+    grpc::CallbackServerContext* call, const v1::SaveMissionRequest* request,
+    v1::SaveMissionResponse* response) {
+  const FieldPath root;
+  const absl::Status checked =
+      CheckFileName(request->file_name(), FieldPath(root, "file_name"));
+  if (!checked.ok()) return Reply(call, checked);
+  return WorkOnFile(call, [this, response, name = request->file_name()] {
+    const std::filesystem::path mission(context_.file.path());
+    absl::StatusOr<storage::SavedCopy> copy =
+        context_.file.SaveCopy(mission.parent_path() / name);
+    if (!copy.ok()) return copy.status();
+    response->set_file_bytes(copy->bytes);
+    response->set_map_revision(copy->revision);
+    response->set_map_digest(std::move(copy->digest));
+    return absl::OkStatus();
+  });
 }
 
 grpc::ServerUnaryReactor* MissionService::VerifyMission(
     grpc::CallbackServerContext* call, const v1::VerifyMissionRequest*,
-    v1::VerifyMissionResponse*) {
-  return Reply(call, NotYet("VerifyMission"));
+    v1::VerifyMissionResponse* response) {
+  return WorkOnFile(call, [this, response] {
+    absl::StatusOr<storage::Proof> proof = context_.file.Verify();
+    if (!proof.ok()) return proof.status();
+    response->set_ok(proof->problems.empty());
+    response->set_map_digest(std::move(proof->digest));
+    for (std::string& problem : proof->problems) {
+      response->add_problems(std::move(problem));
+    }
+    return absl::OkStatus();
+  });
+}
+
+template <typename Job>
+grpc::ServerUnaryReactor* MissionService::WorkOnFile(
+    grpc::CallbackServerContext* call, Job job) {
+  if (!context_.file_calls.Take()) {
+    return Reply(call, TooManyCalls("calls of SaveMission or VerifyMission",
+                                    context_.file_calls.limit()));
+  }
+  grpc::ServerUnaryReactor* reactor = call->DefaultReactor();
+  context_.workers.Give([this, reactor, job] {
+    const absl::Status status = job();
+    context_.file_calls.GiveBack();
+    reactor->Finish(ToGrpc(status));
+  });
+  return reactor;
 }
 
 }  // namespace fathom::server

@@ -52,6 +52,12 @@ class MissionService final : public v1::MissionService::CallbackService {
       v1::VerifyMissionResponse* response) override;
 
  private:
+  // Answers with the status of `job`, which runs on a worker and fills the
+  // response; one such job at a time. RESOURCE_EXHAUSTED if one runs.
+  template <typename Job>
+  grpc::ServerUnaryReactor* WorkOnFile(grpc::CallbackServerContext* call,
+                                       Job job);
+
   ServerContext& context_;
 };
 

@@ -6,7 +6,9 @@
 
 #include <atomic>
 #include <chrono>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "base/clock.h"
 #include "grpcpp/server_context.h"
@@ -25,6 +27,8 @@ struct ServerContext {
   MapKeeper& keeper;
   storage::MissionFile& file;
   const Clock& clock;
+  // What of the file could not be read at the start.
+  std::vector<std::string> damage = {};
   // gRPC runs whatever callbacks are ready on the thread that starts an
   // operation. The keeper's two threads must not be caught up in that, so what
   // they have to tell a call - an ack to write, room to read on - is done by
@@ -33,6 +37,9 @@ struct ServerContext {
   // Long ones: a block of a region, a digest, a page of history.
   Workers workers{kWorkerThreads};
   CallSlots bulk_calls{kMaxBulkStreams};
+  // SaveMission and VerifyMission: each reads the whole file and holds another
+  // map.
+  CallSlots file_calls{1};
   CallRegistry ingest_calls{kMaxIngestStreams};
   CallRegistry import_calls{kMaxImports};
   std::atomic<bool> draining{false};

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <atomic>
+#include <optional>
+#include <set>
 #include <string>
 #include <thread>
 #include <utility>
@@ -11,6 +13,7 @@
 #include "storage/activity_codec.h"
 #include "storage/contact_codec.h"
 #include "storage/journal_codec.h"
+#include "storage/quarantine.h"
 #include "storage/restore.h"
 #include "storage/schema.h"
 #include "storage/tile_codec.h"
@@ -38,23 +41,31 @@ absl::StatusOr<map::RestoredTile> RestoreRow(const TileRow& row,
                                  static_cast<float>(map.global.tolerance_m));
 }
 
-// Decodes, checks and builds the tiles of `rows` on several threads, behind
-// `tiles` in the order of the rows. The error of the first bad row, if any.
+// Tiles as they come: the sound ones, and which are not.
+struct TileHarvest {
+  std::vector<map::RestoredTile> sound;
+  std::set<map::TileKey> damaged;
+  std::vector<std::string> damage;
+
+  // Keeps why the tile is damaged; an error that is not the tile's own (a
+  // newer version, the disk) is returned.
+  absl::Status Quarantine(const map::TileKey& key, const absl::Status& why) {
+    if (!absl::IsDataLoss(why)) return why;
+    damaged.insert(key);
+    damage.push_back(std::string(why.message()));
+    return absl::OkStatus();
+  }
+};
+
+// Decodes, checks and builds the tiles of `rows` on several threads, in the
+// order of the rows.
 absl::Status RestoreRows(const std::vector<TileRow>& rows,
-                         const map::MissionOptions& map,
-                         std::vector<map::RestoredTile>& tiles) {
-  const std::size_t start = tiles.size();
-  tiles.resize(start + rows.size());
-  std::vector<absl::Status> failed(rows.size());
+                         const map::MissionOptions& map, TileHarvest& harvest) {
+  std::vector<absl::StatusOr<map::RestoredTile>> tiles(rows.size());
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
     for (std::size_t i = next++; i < rows.size(); i = next++) {
-      absl::StatusOr<map::RestoredTile> tile = RestoreRow(rows[i], map);
-      if (tile.ok()) {
-        tiles[start + i] = *std::move(tile);
-      } else {
-        failed[i] = tile.status();
-      }
+      tiles[i] = RestoreRow(rows[i], map);
     }
   };
   const unsigned threads = std::clamp(std::thread::hardware_concurrency(), 1u,
@@ -63,31 +74,89 @@ absl::Status RestoreRows(const std::vector<TileRow>& rows,
   for (unsigned i = 1; i < threads; ++i) helpers.emplace_back(work);
   work();
   for (std::thread& helper : helpers) helper.join();
-  for (const absl::Status& status : failed) FATHOM_RETURN_IF_ERROR(status);
+  harvest.sound.reserve(harvest.sound.size() + tiles.size());
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    if (tiles[i].ok()) {
+      harvest.sound.push_back(*std::move(tiles[i]));
+    } else {
+      FATHOM_RETURN_IF_ERROR(
+          harvest.Quarantine(rows[i].key, tiles[i].status()));
+    }
+  }
   return absl::OkStatus();
+}
+
+// The key of the first tile behind `last`, without touching its content.
+absl::StatusOr<std::optional<std::int64_t>> NextTileKey(Connection& connection,
+                                                        std::int64_t last) {
+  FATHOM_ASSIGN_OR_RETURN(
+      Statement select,
+      connection.Prepare("SELECT tile_key FROM tile WHERE tile_key > ? ORDER "
+                         "BY tile_key LIMIT 1"));
+  select.BindInt(0, last);
+  FATHOM_ASSIGN_OR_RETURN(const bool found, select.Step());
+  if (!found) return std::nullopt;
+  return select.ColumnInt(0);
+}
+
+// Reads on behind `last` until the end or `kTileChunkBytes`; false at the end.
+// A tile that cannot be read is put into quarantine and stepped over.
+absl::StatusOr<bool> ReadTileRows(Connection& connection, std::int64_t& last,
+                                  std::vector<TileRow>& rows,
+                                  TileHarvest& harvest) {
+  FATHOM_ASSIGN_OR_RETURN(
+      Statement select,
+      connection.Prepare("SELECT tile_key, content FROM tile WHERE tile_key > "
+                         "? ORDER BY tile_key"));
+  select.BindInt(0, last);
+  std::size_t bytes = 0;
+  while (bytes < kTileChunkBytes) {
+    const absl::StatusOr<bool> more = select.Step();
+    if (!more.ok()) {
+      if (!absl::IsDataLoss(more.status())) return more.status();
+      FATHOM_ASSIGN_OR_RETURN(const std::optional<std::int64_t> key,
+                              NextTileKey(connection, last));
+      if (!key.has_value()) return more.status();
+      const auto tile =
+          map::TileKey::FromPacked(static_cast<std::uint64_t>(*key));
+      FATHOM_RETURN_IF_ERROR(harvest.Quarantine(
+          tile, absl::DataLossError(absl::StrFormat("%s: %s", TileName(tile),
+                                                    more.status().message()))));
+      last = *key;
+      return true;
+    }
+    if (!*more) return false;
+    const std::int64_t key = select.ColumnInt(0);
+    if (key <= last) {
+      return absl::DataLossError(
+          "the tiles are not in the order of their keys");
+    }
+    last = key;
+    const auto tile = map::TileKey::FromPacked(static_cast<std::uint64_t>(key));
+    const ByteSpan blob = select.ColumnBlob(1);
+    rows.push_back({.key = tile, .blob = Bytes(blob.begin(), blob.end())});
+    bytes += blob.size();
+  }
+  return true;
 }
 
 absl::Status LoadTiles(Connection& connection, Loaded& loaded) {
   FATHOM_ASSIGN_OR_RETURN(const map::MissionOptions map,
                           OptionsOf(loaded.metadata));
-  FATHOM_ASSIGN_OR_RETURN(
-      Statement select,
-      connection.Prepare(
-          "SELECT tile_key, content FROM tile ORDER BY tile_key"));
-  std::vector<TileRow> rows;
-  std::size_t bytes = 0;
-  while (true) {
-    FATHOM_ASSIGN_OR_RETURN(const bool more, select.Step());
-    if (!more) return RestoreRows(rows, map, loaded.tiles);
-    const ByteSpan blob = select.ColumnBlob(1);
-    rows.push_back({.key = map::TileKey::FromPacked(select.ColumnUint(0)),
-                    .blob = Bytes(blob.begin(), blob.end())});
-    bytes += blob.size();
-    if (bytes < kTileChunkBytes) continue;
-    FATHOM_RETURN_IF_ERROR(RestoreRows(rows, map, loaded.tiles));
-    rows.clear();
-    bytes = 0;
+  TileHarvest harvest;
+  std::int64_t last = -1;
+  bool more = true;
+  while (more) {
+    std::vector<TileRow> rows;
+    FATHOM_ASSIGN_OR_RETURN(more,
+                            ReadTileRows(connection, last, rows, harvest));
+    FATHOM_RETURN_IF_ERROR(RestoreRows(rows, map, harvest));
   }
+  FATHOM_RETURN_IF_ERROR(
+      MendTree(map.global, harvest.damaged, harvest.sound, harvest.damage));
+  loaded.tiles = std::move(harvest.sound);
+  loaded.damage = std::move(harvest.damage);
+  return absl::OkStatus();
 }
 
 absl::Status LoadBlocks(Connection& connection, std::uint32_t number,

@@ -104,7 +104,8 @@ class MissionFile::Impl {
   absl::Status ReadContactHistory(
       const map::ContactKey& key, Time from, Time to,
       const std::function<bool(const ContactHistoryRow&)>& visit);
-  absl::StatusOr<std::uint64_t> SaveCopy(const std::string& path);
+  absl::StatusOr<SavedCopy> SaveCopy(const std::string& path);
+  absl::StatusOr<Proof> Verify();
   MissionFileStatus Status() const;
 
   const MissionMetadata& metadata() const { return metadata_; }
@@ -123,7 +124,7 @@ class MissionFile::Impl {
   absl::StatusOr<Outcome> WriteBatch(const Batch& batch);
   absl::Status WriteJournal(const std::vector<JournalSegment>& segments);
   absl::Status WritePositions(const Positions& reached);
-  absl::StatusOr<Connection> OpenReader() const;
+  static absl::StatusOr<Connection> OpenReader(const std::string& path);
 
   const std::string path_;
   // Held until all connections are closed: members die in reverse order.
@@ -357,9 +358,10 @@ absl::Status MissionFile::Impl::Close() {
   return status;
 }
 
-absl::StatusOr<Connection> MissionFile::Impl::OpenReader() const {
+absl::StatusOr<Connection> MissionFile::Impl::OpenReader(
+    const std::string& path) {
   FATHOM_ASSIGN_OR_RETURN(Connection reader,
-                          Connection::Open(path_, Connection::Mode::kReadOnly));
+                          Connection::Open(path, Connection::Mode::kReadOnly));
   FATHOM_RETURN_IF_ERROR(reader.Execute(kReaderPragmas));
   return reader;
 }
@@ -369,22 +371,40 @@ absl::Status MissionFile::Impl::ReadContactHistory(
     const std::function<bool(const ContactHistoryRow&)>& visit) {
   MutexLock lock(reader_mutex_);
   if (!reader_.is_open()) {
-    FATHOM_ASSIGN_OR_RETURN(reader_, OpenReader());
+    FATHOM_ASSIGN_OR_RETURN(reader_, OpenReader(path_));
   }
   return ReadHistory(reader_, key, from, to, visit);
 }
 
-absl::StatusOr<std::uint64_t> MissionFile::Impl::SaveCopy(
-    const std::string& path) {
+absl::StatusOr<SavedCopy> MissionFile::Impl::SaveCopy(const std::string& path) {
   const std::string target = CanonicalPath(path);
   FATHOM_RETURN_IF_ERROR(CheckAbsent(target));
   FATHOM_ASSIGN_OR_RETURN(const FileLock lock, FileLock::Acquire(target));
-  // A connection of its own: a long copy keeps no history reader waiting.
-  FATHOM_ASSIGN_OR_RETURN(Connection reader, OpenReader());
   DraftFile draft(target);
-  FATHOM_RETURN_IF_ERROR(reader.BackupTo(draft.path()));
+  {
+    // A connection of its own: a long copy keeps no history reader waiting.
+    FATHOM_ASSIGN_OR_RETURN(Connection reader, OpenReader(path_));
+    FATHOM_RETURN_IF_ERROR(reader.BackupTo(draft.path()));
+  }
+  Proof proof;
+  {
+    FATHOM_ASSIGN_OR_RETURN(Connection copy, OpenReader(draft.path()));
+    FATHOM_ASSIGN_OR_RETURN(proof, ProveMission(copy));
+  }
+  if (!proof.problems.empty()) {
+    return absl::DataLossError(absl::StrFormat(
+        "the copy was not kept: %s (%d problems; VerifyMission tells them)",
+        proof.problems.front(), proof.problems.size()));
+  }
   FATHOM_RETURN_IF_ERROR(draft.Publish());
-  return SizeOf(target);
+  return SavedCopy{.bytes = SizeOf(target),
+                   .revision = proof.revision,
+                   .digest = std::move(proof.digest)};
+}
+
+absl::StatusOr<Proof> MissionFile::Impl::Verify() {
+  FATHOM_ASSIGN_OR_RETURN(Connection reader, OpenReader(path_));
+  return ProveMission(reader);
 }
 
 MissionFileStatus MissionFile::Impl::Status() const {
@@ -453,9 +473,10 @@ absl::Status MissionFile::ReadContactHistory(
   return impl_->ReadContactHistory(key, from, to, visit);
 }
 
-absl::StatusOr<std::uint64_t> MissionFile::SaveCopy(const std::string& path) {
+absl::StatusOr<SavedCopy> MissionFile::SaveCopy(const std::string& path) {
   return impl_->SaveCopy(path);
 }
+absl::StatusOr<Proof> MissionFile::Verify() { return impl_->Verify(); }
 
 MissionFileStatus MissionFile::Status() const { return impl_->Status(); }
 const MissionMetadata& MissionFile::metadata() const {

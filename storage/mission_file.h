@@ -18,8 +18,8 @@
 // automatically. docs/storage_format.md describes the file to the byte.
 //
 // Thread safety: Commit, Load, CopyLog and Close belong to one thread at a
-// time (the storage thread); ReadContactHistory, Status, SaveCopy and
-// metadata may be called from any thread at any time.
+// time (the storage thread); ReadContactHistory, Status, SaveCopy,
+// Verify and metadata may be called from any thread at any time.
 
 #ifndef FATHOM_STORAGE_MISSION_FILE_H_
 #define FATHOM_STORAGE_MISSION_FILE_H_
@@ -35,6 +35,7 @@
 #include "map/contacts/contact.h"
 #include "map/geodesy/ids.h"
 #include "storage/mission_records.h"
+#include "storage/verify.h"
 
 namespace fathom::storage {
 
@@ -65,6 +66,14 @@ struct MissionFileStatus {
   // Every change up to this revision is on the disk.
   std::uint64_t durable_revision = 0;
   std::uint64_t checkpoint_revision = 0;
+};
+
+// What SaveCopy wrote.
+struct SavedCopy {
+  std::uint64_t bytes = 0;
+  // Of the map in it.
+  std::uint64_t revision = 0;
+  std::string digest;
 };
 
 class MissionFile {
@@ -105,7 +114,8 @@ class MissionFile {
   absl::Status Commit(const Batch& batch);
 
   // Reads the whole mission. Before the first Commit. A blob whose checksum
-  // fails is DATA_LOSS naming the tile, block, contact or segment. Tiles are
+  // fails is DATA_LOSS naming the block, contact or segment; only a tile is
+  // left out and told in Loaded::damage (quarantine.h). Tiles are
   // decoded on up to four threads, ended when it returns. Cost: about 30 ns
   // of processor time per leaf.
   absl::StatusOr<Loaded> Load();
@@ -127,9 +137,14 @@ class MissionFile {
       const std::function<bool(const ContactHistoryRow&)>& visit);
 
   // Writes a consistent copy, as of the last commit, to `path` (which must
-  // not exist) while work goes on; fsynced. Returns its size in bytes.
-  // Errors: ALREADY_EXISTS; those of sqlite.h (no partial file stays).
-  absl::StatusOr<std::uint64_t> SaveCopy(const std::string& path);
+  // not exist) while work goes on: copied, fsynced, proved (verify.h), and
+  // only then given its name. Cost: a start's, and memory for another map.
+  // Errors: ALREADY_EXISTS; DATA_LOSS naming the first problem; those of
+  // sqlite.h. No partial file stays.
+  absl::StatusOr<SavedCopy> SaveCopy(const std::string& path);
+
+  // Proves the mission as of the last commit, while work goes on (verify.h).
+  absl::StatusOr<Proof> Verify();
 
   MissionFileStatus Status() const;
   const MissionMetadata& metadata() const;

@@ -167,6 +167,9 @@ struct Loaded {
   std::vector<JournalRecord> journal;
   // Revision of the last record, or of the checkpoint: where the map will be.
   std::uint64_t revision = 0;
+  // What could not be read and was left out, for people: tiles in quarantine
+  // (quarantine.h). Empty: everything is sound.
+  std::vector<std::string> damage;
 };
 
 }  // namespace fathom::storage

@@ -225,9 +225,6 @@ class MainJob(LiveTest):
                  obstacle.WatchContactsRequest()),
                 (server.obstacle.WatchTrajectory,
                  obstacle.WatchTrajectoryRequest()),
-                (server.mission.SaveMission, mission.SaveMissionRequest()),
-                (server.mission.VerifyMission,
-                 mission.VerifyMissionRequest()),
             ]:
                 self.assert_status(grpc.StatusCode.UNIMPLEMENTED, call,
                                    request)
