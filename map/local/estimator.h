@@ -25,7 +25,7 @@
 
 #include "absl/status/statusor.h"
 #include "map/geodesy/depth_fusion.h"  // IWYU pragma: export
-#include "map/local/placement.h"
+#include "map/local/cell_index.h"
 
 namespace fathom::map {
 

@@ -10,9 +10,9 @@
 #include <cstdint>
 
 #include "map/geodesy/ned_frame.h"
+#include "map/local/cell_index.h"
 #include "map/local/local_block.h"
 #include "map/local/local_map_options.h"
-#include "map/local/placement.h"
 
 namespace fathom::map {
 
@@ -43,16 +43,20 @@ struct LocalGrid {
            static_cast<std::uint32_t>(cell.j) < cells_east;
   }
 
-  // The cell under a point of the plane into `cell`; false outside and for
-  // NaN. (Not an optional: on the path of each sounding its packing stalls.)
-  // The bound keeps CellOf's conversion to integers defined.
-  bool Locate(double north_m, double east_m, CellIndex& cell) const {
-    constexpr double kBoundM = 1e7;  // Beyond any grid; at 1 cm 1e9 cells.
-    if (!(std::fabs(north_m) < kBoundM && std::fabs(east_m) < kBoundM)) {
+  // Eq. 4.5: i = floor(x / res), j = floor(y / res). The quotients, cells north
+  // and east of the south-west corner, to a cell; a cell owns its south and
+  // west border. False outside and for NaN. (Not an optional: on the path of
+  // each sounding its packing stalls.)
+  bool Locate(double cells_north_of, double cells_east_of,
+              CellIndex& cell) const {
+    if (!(cells_north_of >= 0.0 && cells_north_of < cells_north &&
+          cells_east_of >= 0.0 && cells_east_of < cells_east)) {
       return false;
     }
-    cell = CellOf(north_m, east_m, options.cell_size_m);
-    return Contains(cell);
+    // Truncation: the floor of what is not negative.
+    cell = {.i = static_cast<std::int32_t>(cells_north_of),
+            .j = static_cast<std::int32_t>(cells_east_of)};
+    return true;
   }
 
   static BlockIndex BlockOf(CellIndex cell) {

@@ -133,6 +133,13 @@ float FloorAround(const LocalBlock& block, std::size_t k) {
              : std::numeric_limits<float>::quiet_NaN();
 }
 
+// A beam and where it falls.
+struct Hit {
+  const Beam* beam = nullptr;
+  CellIndex cell;
+  LocalBlock* block = nullptr;  // The cell's, mutable while this view lasts.
+};
+
 }  // namespace
 
 struct LocalMap::State {
@@ -150,13 +157,27 @@ struct LocalMap::State {
     return *directory;
   }
 
-  LocalBlock& MutableBlock(BlockIndex index, const PriorSource& prior);
+  // A block of `mine`, the mutable directory, mutable and with its prior.
+  LocalBlock& MutableBlock(BlockDirectory& mine, BlockIndex index,
+                           const PriorSource& prior) {
+    bool created = false;
+    LocalBlock& block = mine.Mutable(index, epoch, created);
+    if (created) [[unlikely]] {
+      FillPrior(index, prior, block);
+      mine.CountArrays(block, +1);
+    }
+    return block;
+  }
+  // Finds the cells of hits that fall at `places`, in cells, and their blocks.
+  // Returns the hits inside the grid, moved to the front.
+  std::span<const Hit> Locate(const BeamPlaces& places,
+                              const PriorSource& prior, std::span<Hit> hits);
   void FillPrior(BlockIndex index, const PriorSource& prior,
                  LocalBlock& block) const;
-  // False: held back as a gross shoal. `block`: the cell's, mutable. `last_m`:
-  // the depth of the ping's accepted beam before, NaN at its first.
-  bool AddSounding(CellIndex cell, const Beam& beam, std::uint32_t time_s,
-                   float last_m, const PriorSource& prior, LocalBlock& block);
+  // False: held back as a gross shoal. `last_m`: the depth of the ping's
+  // accepted beam before, NaN at its first.
+  bool AddSounding(const Hit& hit, std::uint32_t time_s, float last_m,
+                   const PriorSource& prior);
   // Whether the sounding has to wait for a second one; brings in the one that
   // waited if this is the second.
   bool HoldBack(LocalBlock& block, std::size_t k, const Beam& beam,
@@ -215,16 +236,24 @@ void LocalMap::State::FillPrior(BlockIndex index, const PriorSource& prior,
   }
 }
 
-LocalBlock& LocalMap::State::MutableBlock(BlockIndex index,
-                                          const PriorSource& prior) {
-  bool created = false;
+std::span<const Hit> LocalMap::State::Locate(const BeamPlaces& places,
+                                             const PriorSource& prior,
+                                             std::span<Hit> hits) {
   BlockDirectory& mine = MutableDirectory();
-  LocalBlock& block = mine.Mutable(index, epoch, created);
-  if (created) {
-    FillPrior(index, prior, block);
-    mine.CountArrays(block, +1);
+  std::size_t count = 0;
+  for (std::size_t n = 0; n < hits.size(); ++n) {
+    const auto lane = static_cast<Eigen::Index>(n);
+    CellIndex cell;
+    if (!grid->Locate(places.north[lane], places.east[lane], cell)) continue;
+    LocalBlock& block = MutableBlock(mine, LocalGrid::BlockOf(cell), prior);
+    block.evidence.PrefetchPlace(LocalGrid::OffsetOf(cell));
+    hits[count++] = {.beam = hits[n].beam, .cell = cell, .block = &block};
   }
-  return block;
+  hits = hits.first(count);
+  for (const Hit& hit : hits) {
+    hit.block->evidence.PrefetchCell(LocalGrid::OffsetOf(hit.cell));
+  }
+  return hits;
 }
 
 void LocalMap::State::AddTo(LocalBlock& block, std::size_t k, float depth_m,
@@ -270,10 +299,11 @@ bool LocalMap::State::HoldBack(LocalBlock& block, std::size_t k,
   return !confirmed;
 }
 
-bool LocalMap::State::AddSounding(CellIndex cell, const Beam& beam,
-                                  std::uint32_t time_s, float last_m,
-                                  const PriorSource& prior, LocalBlock& block) {
-  const std::size_t k = LocalGrid::OffsetOf(cell);
+bool LocalMap::State::AddSounding(const Hit& hit, std::uint32_t time_s,
+                                  float last_m, const PriorSource& prior) {
+  const Beam& beam = *hit.beam;
+  LocalBlock& block = *hit.block;
+  const std::size_t k = LocalGrid::OffsetOf(hit.cell);
   if (grid->options.estimator == EstimatorKind::kAdaptive) {
     // Most soundings are like the beam before and need no look at the cell.
     const bool plain = !std::isnan(last_m) && block.pending.empty() &&
@@ -288,7 +318,7 @@ bool LocalMap::State::AddSounding(CellIndex cell, const Beam& beam,
   const double variance_m2 = std_m * std_m;
   FuseNervegna(Gain(estimate.variance_m2, variance_m2), beam.depth_m,
                variance_m2, estimate);
-  if (grid->reach > 0) Smooth(cell, estimate, time_s, prior);
+  if (grid->reach > 0) Smooth(hit.cell, estimate, time_s, prior);
   return true;
 }
 
@@ -299,14 +329,15 @@ void LocalMap::State::Smooth(CellIndex cell, const NervegnaCell& updated,
       SmoothBounds(cell, grid->reach, grid->cells_north, grid->cells_east);
   const double scale = grid->options.smoothing_scale;
   constexpr std::int32_t kSide = static_cast<std::int32_t>(kBlockSide);
+  BlockDirectory& mine = MutableDirectory();
   for (std::int32_t south = bounds.south; south <= bounds.north;) {
     const std::int32_t next_south = (south / kSide + 1) * kSide;
     const std::int32_t north = std::min(bounds.north, next_south - 1);
     for (std::int32_t west = bounds.west; west <= bounds.east;) {
       const std::int32_t next_west = (west / kSide + 1) * kSide;
       const std::int32_t east = std::min(bounds.east, next_west - 1);
-      LocalBlock& block =
-          MutableBlock(LocalGrid::BlockOf({.i = south, .j = west}), prior);
+      LocalBlock& block = MutableBlock(
+          mine, LocalGrid::BlockOf({.i = south, .j = west}), prior);
       const std::size_t before = block.evidence.memory_bytes();
       for (std::int32_t i = south; i <= north; ++i) {
         for (std::int32_t j = west; j <= east; ++j) {
@@ -356,22 +387,22 @@ LocalMap::UpdateResult LocalMap::Update(const Ping& ping,
       grid.frame.NorthAzimuthRad(ping.pose.position);
   const std::uint32_t time_s = ToUnixSeconds(ping.time);
   float last_m = std::numeric_limits<float>::quiet_NaN();
-  // Some beams at a time: all are placed, then all are added, so that the
-  // memory of one is fetched while others are reckoned.
-  struct Placed {
-    const Beam* beam;
-    CellIndex cell;
-    LocalBlock* block;
-  };
-  std::array<Placed, 16> placed;
+  // Some beams at a time: all are placed, then all are looked up, then all are
+  // added, so that the memory of one is fetched while others are reckoned.
+  std::array<Hit, kBeamsAtOnce> hits;
+  BeamFloats range_m = BeamFloats::Zero();
+  BeamFloats bearing_rad = BeamFloats::Zero();
   std::size_t count = 0;
-  const auto add_placed = [&] {
-    for (const Placed& hit : std::span(placed.data(), count)) {
-      hit.block->evidence.PrefetchCell(LocalGrid::OffsetOf(hit.cell));
-    }
-    for (const Placed& hit : std::span(placed.data(), count)) {
-      if (state_->AddSounding(hit.cell, *hit.beam, time_s, last_m, prior,
-                              *hit.block)) {
+  const auto add = [&] {
+    const BeamPlaces at = ObstaclePosition(
+        vehicle, BeamOffset(range_m, BeamAzimuthRad(heading_rad, bearing_rad)));
+    const std::span<const Hit> inside =
+        state_->Locate({.north = at.north / grid.options.cell_size_m,
+                        .east = at.east / grid.options.cell_size_m},
+                       prior, std::span(hits.data(), count));
+    result.rejects.Add(RejectReason::kOutsideArea, count - inside.size());
+    for (const Hit& hit : inside) {
+      if (state_->AddSounding(hit, time_s, last_m, prior)) {
         last_m = hit.beam->depth_m;
         ++result.accepted;
       } else {
@@ -380,10 +411,6 @@ LocalMap::UpdateResult LocalMap::Update(const Ping& ping,
     }
     count = 0;
   };
-  // Neighbouring beams fall in few blocks: each is looked up once in a row.
-  // It stays where it is while this view's epoch lasts.
-  LocalBlock* block = nullptr;
-  BlockIndex block_index;
   for (const Beam& beam : ping.beams) {
     if (!Passes(beam, grid.options)) {
       if (const auto bad = Threshold(beam, grid.options)) {
@@ -391,24 +418,13 @@ LocalMap::UpdateResult LocalMap::Update(const Ping& ping,
         continue;
       }
     }
-    const NedPoint obstacle = ObstaclePosition(
-        vehicle, BeamOffset(beam.range_m,
-                            BeamAzimuthRad(heading_rad, beam.bearing_rad)));
-    CellIndex cell;
-    if (!grid.Locate(obstacle.north_m, obstacle.east_m, cell)) {
-      result.rejects.Add(RejectReason::kOutsideArea);
-      continue;
-    }
-    const BlockIndex index = LocalGrid::BlockOf(cell);
-    if (block == nullptr || index != block_index) {
-      block = &state_->MutableBlock(index, prior);
-      block_index = index;
-    }
-    block->evidence.PrefetchPlace(LocalGrid::OffsetOf(cell));
-    placed[count++] = {.beam = &beam, .cell = cell, .block = block};
-    if (count == placed.size()) add_placed();
+    hits[count].beam = &beam;
+    const auto lane = static_cast<Eigen::Index>(count);
+    range_m[lane] = beam.range_m;
+    bearing_rad[lane] = beam.bearing_rad;
+    if (++count == hits.size()) add();
   }
-  add_placed();
+  add();
   return result;
 }
 
@@ -416,10 +432,11 @@ void LocalMap::MarkTransferred() {
   const LocalMapView before = View();
   before.ForEachBlock([this](BlockIndex index, const LocalBlock& seen) {
     if (seen.evidence.CountFresh() == 0) return;
-    LocalBlock& block = state_->MutableBlock(index, nullptr);
-    state_->directory->CountArrays(block, -1);
+    BlockDirectory& mine = state_->MutableDirectory();
+    LocalBlock& block = state_->MutableBlock(mine, index, nullptr);
+    mine.CountArrays(block, -1);
     block.evidence.MarkTransferred();
-    state_->directory->CountArrays(block, +1);
+    mine.CountArrays(block, +1);
   });
 }
 

@@ -250,8 +250,11 @@ std::optional<CellIndex> LocalMapView::CellAt(
     const GeodeticPoint& point) const {
   if (grid_ == nullptr) return std::nullopt;
   const NedPoint at = grid_->frame.ToNed(point);
+  const double size_m = grid_->options.cell_size_m;
   CellIndex cell;
-  if (!grid_->Locate(at.north_m, at.east_m, cell)) return std::nullopt;
+  if (!grid_->Locate(at.north_m / size_m, at.east_m / size_m, cell)) {
+    return std::nullopt;
+  }
   return cell;
 }
 

@@ -18,9 +18,9 @@
 #include "map/geodesy/depth_estimate.h"
 #include "map/geodesy/ned_frame.h"
 #include "map/geodesy/points.h"
+#include "map/local/cell_index.h"
 #include "map/local/local_block.h"
 #include "map/local/local_map_options.h"
-#include "map/local/placement.h"
 
 namespace fathom::map {
 

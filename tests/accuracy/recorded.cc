@@ -92,8 +92,11 @@ nlohmann::json RecordedFigures(const std::string& soundings_csv_gz) {
     for (const Recorded& recorded : soundings) {
       if (recorded.odd) continue;
       const Sounding& sounding = recorded.sounding;
-      const auto estimate = view.AtCell(
-          map::CellOf(sounding.place.north_m, sounding.place.east_m, cell_m));
+      const auto estimate =
+          view.AtCell({.i = static_cast<std::int32_t>(
+                           std::floor(sounding.place.north_m / cell_m)),
+                       .j = static_cast<std::int32_t>(
+                           std::floor(sounding.place.east_m / cell_m))});
       if (!estimate) continue;
       // The verifying sounding has noise of its own.
       const double std_m = std::hypot(estimate->std_m, sounding.std_m);
