@@ -123,8 +123,10 @@ class EvidenceCells {
   void MarkTransferred();
 
   // Heap memory; a function of size() and any_transferred() alone.
-  std::size_t memory_bytes() const {
-    return RoomFor(size()) * sizeof(PackedEvidence) *
+  std::size_t memory_bytes() const { return MemoryBytesOf(size()); }
+  // What it would be with so many cells.
+  std::size_t MemoryBytesOf(std::size_t cells) const {
+    return RoomFor(cells) * sizeof(PackedEvidence) *
            (any_transferred() ? 2 : 1);
   }
 

@@ -140,6 +140,35 @@ struct Hit {
   LocalBlock* block = nullptr;  // The cell's, mutable while this view lasts.
 };
 
+// Some beams of a ping: all are placed, then all are looked up, then all are
+// added, so that the memory of one is fetched while others are reckoned.
+struct Hits {
+  std::array<Hit, kBeamsAtOnce> hits;
+  std::size_t count = 0;
+  BeamFloats range_m = BeamFloats::Zero();
+  BeamFloats bearing_rad = BeamFloats::Zero();
+
+  std::span<Hit> all() { return std::span(hits).first(count); }
+  // The beams that pass the thresholds. REQUIRES: at most kBeamsAtOnce.
+  void Take(std::span<const Beam> beams, const LocalMapOptions& options,
+            RejectCounts& rejects) {
+    count = 0;
+    for (const Beam& beam : beams) {
+      if (!Passes(beam, options)) {
+        if (const auto bad = Threshold(beam, options)) {
+          rejects.Add(*bad);
+          continue;
+        }
+      }
+      hits[count].beam = &beam;
+      const auto lane = static_cast<Eigen::Index>(count);
+      range_m[lane] = beam.range_m;
+      bearing_rad[lane] = beam.bearing_rad;
+      ++count;
+    }
+  }
+};
+
 }  // namespace
 
 struct LocalMap::State {
@@ -168,10 +197,9 @@ struct LocalMap::State {
     }
     return block;
   }
-  // Finds the cells of hits that fall at `places`, in cells, and their blocks.
-  // Returns the hits inside the grid, moved to the front.
-  std::span<const Hit> Locate(const BeamPlaces& places,
-                              const PriorSource& prior, std::span<Hit> hits);
+  // Places the hits and finds their blocks; those outside the grid go.
+  void Locate(const NedPoint& vehicle, double heading_rad,
+              const PriorSource& prior, Hits& hits, RejectCounts& rejects);
   void FillPrior(BlockIndex index, const PriorSource& prior,
                  LocalBlock& block) const;
   // False: held back as a gross shoal. `last_m`: the depth of the ping's
@@ -236,33 +264,43 @@ void LocalMap::State::FillPrior(BlockIndex index, const PriorSource& prior,
   }
 }
 
-std::span<const Hit> LocalMap::State::Locate(const BeamPlaces& places,
-                                             const PriorSource& prior,
-                                             std::span<Hit> hits) {
+void LocalMap::State::Locate(const NedPoint& vehicle, double heading_rad,
+                             const PriorSource& prior, Hits& hits,
+                             RejectCounts& rejects) {
+  const BeamPlaces at = ObstaclePosition(
+      vehicle,
+      BeamOffset(hits.range_m, BeamAzimuthRad(heading_rad, hits.bearing_rad)));
+  const BeamDoubles north = at.north / grid->options.cell_size_m;
+  const BeamDoubles east = at.east / grid->options.cell_size_m;
   BlockDirectory& mine = MutableDirectory();
-  std::size_t count = 0;
-  for (std::size_t n = 0; n < hits.size(); ++n) {
+  std::size_t inside = 0;
+  for (std::size_t n = 0; n < hits.count; ++n) {
     const auto lane = static_cast<Eigen::Index>(n);
     CellIndex cell;
-    if (!grid->Locate(places.north[lane], places.east[lane], cell)) continue;
+    if (!grid->Locate(north[lane], east[lane], cell)) {
+      rejects.Add(RejectReason::kOutsideArea);
+      continue;
+    }
     LocalBlock& block = MutableBlock(mine, LocalGrid::BlockOf(cell), prior);
     block.evidence.PrefetchPlace(LocalGrid::OffsetOf(cell));
-    hits[count++] = {.beam = hits[n].beam, .cell = cell, .block = &block};
+    hits.hits[inside++] = {
+        .beam = hits.hits[n].beam, .cell = cell, .block = &block};
   }
-  hits = hits.first(count);
-  for (const Hit& hit : hits) {
+  hits.count = inside;
+  for (const Hit& hit : hits.all()) {
     hit.block->evidence.PrefetchCell(LocalGrid::OffsetOf(hit.cell));
   }
-  return hits;
 }
 
-void LocalMap::State::AddTo(LocalBlock& block, std::size_t k, float depth_m,
-                            float std_m, std::uint32_t time_s) {
-  const std::size_t before = block.evidence.memory_bytes();
-  if (block.evidence.Add(k, depth_m, std_m, time_s)) {
-    directory->CountMeasured(+1);
-    directory->CountBytes(block.evidence.memory_bytes() - before);
-  }
+inline void LocalMap::State::AddTo(LocalBlock& block, std::size_t k,
+                                   float depth_m, float std_m,
+                                   std::uint32_t time_s) {
+  const std::size_t before = block.evidence.size();
+  if (!block.evidence.Add(k, depth_m, std_m, time_s)) [[likely]]
+    return;
+  directory->CountMeasured(+1);
+  directory->CountBytes(block.evidence.memory_bytes() -
+                        block.evidence.MemoryBytesOf(before));
 }
 
 bool LocalMap::State::HoldBack(LocalBlock& block, std::size_t k,
@@ -387,21 +425,13 @@ LocalMap::UpdateResult LocalMap::Update(const Ping& ping,
       grid.frame.NorthAzimuthRad(ping.pose.position);
   const std::uint32_t time_s = ToUnixSeconds(ping.time);
   float last_m = std::numeric_limits<float>::quiet_NaN();
-  // Some beams at a time: all are placed, then all are looked up, then all are
-  // added, so that the memory of one is fetched while others are reckoned.
-  std::array<Hit, kBeamsAtOnce> hits;
-  BeamFloats range_m = BeamFloats::Zero();
-  BeamFloats bearing_rad = BeamFloats::Zero();
-  std::size_t count = 0;
-  const auto add = [&] {
-    const BeamPlaces at = ObstaclePosition(
-        vehicle, BeamOffset(range_m, BeamAzimuthRad(heading_rad, bearing_rad)));
-    const std::span<const Hit> inside =
-        state_->Locate({.north = at.north / grid.options.cell_size_m,
-                        .east = at.east / grid.options.cell_size_m},
-                       prior, std::span(hits.data(), count));
-    result.rejects.Add(RejectReason::kOutsideArea, count - inside.size());
-    for (const Hit& hit : inside) {
+  Hits hits;
+  for (std::span<const Beam> rest(ping.beams); !rest.empty();) {
+    const std::size_t most = std::min<std::size_t>(rest.size(), kBeamsAtOnce);
+    hits.Take(rest.first(most), grid.options, result.rejects);
+    rest = rest.subspan(most);
+    state_->Locate(vehicle, heading_rad, prior, hits, result.rejects);
+    for (const Hit& hit : hits.all()) {
       if (state_->AddSounding(hit, time_s, last_m, prior)) {
         last_m = hit.beam->depth_m;
         ++result.accepted;
@@ -409,22 +439,7 @@ LocalMap::UpdateResult LocalMap::Update(const Ping& ping,
         result.rejects.Add(RejectReason::kGated);
       }
     }
-    count = 0;
-  };
-  for (const Beam& beam : ping.beams) {
-    if (!Passes(beam, grid.options)) {
-      if (const auto bad = Threshold(beam, grid.options)) {
-        result.rejects.Add(*bad);
-        continue;
-      }
-    }
-    hits[count].beam = &beam;
-    const auto lane = static_cast<Eigen::Index>(count);
-    range_m[lane] = beam.range_m;
-    bearing_rad[lane] = beam.bearing_rad;
-    if (++count == hits.size()) add();
   }
-  add();
   return result;
 }
 

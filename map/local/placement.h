@@ -33,16 +33,18 @@ struct BeamPlaces {
 // Eq. 4.1: theta = phi + beta. All radians; the result is not reduced.
 inline BeamFloats BeamAzimuthRad(double heading_rad,
                                  const BeamFloats& bearing_rad) {
-  return (heading_rad + bearing_rad.cast<double>()).cast<float>();
+  return static_cast<float>(heading_rad) + bearing_rad;
 }
 
 // Eq. 4.2: (r cos theta, r sin theta), metres north and east of the vehicle.
-// In float: at 1000 m and |theta| < 2 pi the error is below 0.4 mm.
+// In float: with |theta| < 2 pi the error of both equations is below 7e-7 r,
+// 0.7 mm at a kilometre.
 inline BeamPlaces BeamOffset(const BeamFloats& range_m,
                              const BeamFloats& azimuth_rad) {
-  const BeamDoubles range = range_m.cast<double>();
-  return {.north = range * azimuth_rad.cos().cast<double>(),
-          .east = range * azimuth_rad.sin().cast<double>()};
+  // Into variables: within a cast Eigen reckons them one by one.
+  const BeamFloats north_m = range_m * azimuth_rad.cos();
+  const BeamFloats east_m = range_m * azimuth_rad.sin();
+  return {.north = north_m.cast<double>(), .east = east_m.cast<double>()};
 }
 
 // Eq. 4.4: the vehicle's place plus the offset, metres.

@@ -32,16 +32,20 @@ TEST(Placement, Eq4_2OffsetIsRangeTimesCosineAndSine) {
   }
 }
 
-// The float's error: half a unit of 4.8e-7 rad below 2 pi, plus 1.2e-7 of the
-// functions: 0.36 mm.
-TEST(Placement, Eq4_2OffsetAtAKilometreIsGoodToAThirdOfAMillimetre) {
+// The floats' error below 2 pi: the azimuth's, half a unit of 4.8e-7 rad twice
+// (heading plus bearing), 1.2e-7 of the functions and 6e-8 of the product:
+// 6.6e-7 r.
+TEST(Placement, Eq4_2OffsetIsGoodToAMillimetreAtAKilometre) {
   for (int k = -2000; k <= 2000; ++k) {
-    const double azimuth_rad = k * 0.0031;
-    const BeamPlaces offset =
-        BeamOffset(BeamFloats::Constant(1000.0f),
-                   BeamFloats::Constant(static_cast<float>(azimuth_rad)));
-    EXPECT_NEAR(offset.north[kLast], 1000.0 * std::cos(azimuth_rad), 4e-4);
-    EXPECT_NEAR(offset.east[kLast], 1000.0 * std::sin(azimuth_rad), 4e-4);
+    const double heading_rad = k * 0.0016;
+    const double bearing_rad = k * 0.0015;
+    const BeamPlaces offset = BeamOffset(
+        BeamFloats::Constant(1000.0f),
+        BeamAzimuthRad(heading_rad,
+                       BeamFloats::Constant(static_cast<float>(bearing_rad))));
+    const double azimuth_rad = heading_rad + bearing_rad;
+    EXPECT_NEAR(offset.north[kLast], 1000.0 * std::cos(azimuth_rad), 7e-4);
+    EXPECT_NEAR(offset.east[kLast], 1000.0 * std::sin(azimuth_rad), 7e-4);
   }
 }
 
