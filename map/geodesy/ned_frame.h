@@ -58,6 +58,8 @@ class NedFrame {
   double cos_lat_;
   double axis_m_;    // Distance of the origin from the Earth's axis.
   double height_m_;  // And from the plane of the equator, positive north.
+  double normal_m_;  // N: radius of curvature in the prime vertical there.
+  double stretch_;   // e^2 / (1 - e^2 sin^2), of the origin's latitude.
 };
 
 // Nervegna 2002, eq. 4.3, as printed: x = (lat - lat_ref) R,

@@ -58,16 +58,13 @@ void VisitDifferent(const Tile* old, const Tile& now,
 
 }  // namespace
 
-std::optional<DepthEstimate> GlobalMapView::At(
-    const GeodeticPoint& point) const {
-  // One object on all ways out, filled in place: copying it would wait for the
-  // store buffer (20 ns).
-  std::optional<DepthEstimate> answer;
+bool GlobalMapView::Read(const GeodeticPoint& point,
+                         DepthEstimate& estimate) const {
   const std::optional<LatticePoint> place = root_.LocateLattice(point);
-  if (!place || root_tile_ == nullptr) return answer;
+  if (!place || root_tile_ == nullptr) return false;
   const Tile::Found found = Tile::Descend(*root_tile_, place->row, place->col);
-  if (!found.leaf.known()) return answer;
-  DepthEstimate& estimate = answer.emplace();
+  if (!found.leaf.known()) return false;
+  estimate = {};
   estimate.depth_m = found.leaf.depth_m;
   estimate.std_m = found.leaf.std_m();
   estimate.kind = ToEvidenceKind(found.leaf.kind());
@@ -79,6 +76,13 @@ std::optional<DepthEstimate> GlobalMapView::At(
     estimate.hazard_m = found.leaf.hazard_m;
   }
   estimate.cell_size_m = static_cast<float>(root_.cell_size_m(found.level));
+  return true;
+}
+
+std::optional<DepthEstimate> GlobalMapView::At(
+    const GeodeticPoint& point) const {
+  std::optional<DepthEstimate> answer;
+  if (!Read(point, answer.emplace())) answer.reset();
   return answer;
 }
 

@@ -46,8 +46,11 @@ class GlobalMapView {
   // where nothing is known, outside the square and for coordinates that are
   // not finite. variability_m and hazard_m as they are known; shoalest_m and
   // soundings are not kept (NaN, 0). At most four tiles deep;
-  // <= 80 ns on a warm map.
+  // <= 50 ns on a warm map.
   std::optional<DepthEstimate> At(const GeodeticPoint& point) const;
+  // The same into `estimate`, for who has a place for it; false (`estimate` is
+  // then whatever it was) where At is nullopt.
+  bool Read(const GeodeticPoint& point, DepthEstimate& estimate) const;
 
   // As At, with the leaf as it is kept and the cell that it fills; an unknown
   // leaf too. nullopt outside the square.

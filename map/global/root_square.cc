@@ -25,6 +25,10 @@ RootSquare::Fan RootSquare::MakeFan(const Vector3& low, const Vector3& high,
   if (Dot(fan.forward, center) < 0) fan.forward = -fan.forward;
   fan.angle_rad = AngleBetween(low, high);
   fan.reciprocal_rad = 1 / fan.angle_rad;
+  const Vector3 pole{.x = 0, .y = 0, .z = 1};
+  const double turn_rad = -std::atan2(center.y, center.x);
+  fan.turned_middle = Rotate(fan.middle, pole, turn_rad);
+  fan.turned_forward = Rotate(fan.forward, pole, turn_rad);
   return fan;
 }
 
@@ -71,6 +75,9 @@ absl::StatusOr<RootSquare> RootSquare::Create(const GeodeticPoint& south_west,
   const Vector3 center = Unit(nw + sw + ne + se);
   square.rows_ = MakeFan(square.south_, -square.north_, center);
   square.cols_ = MakeFan(square.west_, -square.east_, center);
+  square.middle_ = ToGeodetic(center);
+  square.middle_latitude_ = {.sine = center.z,
+                             .cosine = std::hypot(center.x, center.y)};
 
   const double north_south_m = DistanceM(square.Unproject({.u = 0, .v = 0.5}),
                                          square.Unproject({.u = 1, .v = 0.5}));

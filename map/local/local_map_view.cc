@@ -314,13 +314,17 @@ std::optional<DepthEstimate> LocalMapView::EvidenceAt(
 
 float LocalMapView::PendingHazardAt(const GeodeticPoint& point) const {
   constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-  if (directory_ == nullptr || directory_->pending_count() == 0) return kNone;
+  if (!any_pending()) return kNone;
   const std::optional<CellIndex> cell = CellAt(point);
   if (!cell.has_value()) return kNone;
   const Place place = PlaceOf(*directory_, *cell);
   if (place.block == nullptr) return kNone;
   const PendingShoal* shoal = place.block->PendingAt(place.k);
   return shoal == nullptr ? kNone : HazardDepth(*shoal);
+}
+
+bool LocalMapView::any_pending() const {
+  return directory_ != nullptr && directory_->pending_count() > 0;
 }
 
 void LocalMapView::ForEachMeasuredArea(

@@ -58,6 +58,8 @@ class LocalMapView {
   // hazard_m of a sounding that waits in the cell under the point for a second
   // one (map/local/hazard.h), also where At() has no answer; NaN: none waits.
   float PendingHazardAt(const GeodeticPoint& point) const;
+  // Whether any sounding of the map waits.
+  bool any_pending() const;
 
   // What the soundings since the last transfer alone say, the prior left out:
   // what a transfer carries to the global map. kMeasured or nullopt. (For

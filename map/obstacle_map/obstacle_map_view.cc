@@ -14,10 +14,6 @@ SeabedEstimate FromActivity(const DepthEstimate& estimate,
   return {.estimate = estimate, .local = true, .activity = &activity.id};
 }
 
-bool IsMeasured(const std::optional<DepthEstimate>& estimate) {
-  return estimate.has_value() && estimate->kind == EvidenceKind::kMeasured;
-}
-
 void AddEvidence(const PackedEvidence* cell, Digest64& digest) {
   if (cell == nullptr) return;
   digest.Add(cell->weight);
@@ -115,61 +111,61 @@ const ActivityView* ObstacleMapView::FindActivity(const ActivityId& id) const {
 
 std::optional<SeabedEstimate> ObstacleMapView::SeabedAt(
     const GeodeticPoint& point, LayerChoice layers) const {
-  std::optional<SeabedEstimate> seabed;
+  std::optional<SeabedEstimate> seabed = JoinLayers(point, layers);
+  if (!seabed.has_value() || layers == LayerChoice::kGlobalOnly) return seabed;
   // What waits for a second sounding where nothing was measured yet.
-  float hazard_m = std::numeric_limits<float>::quiet_NaN();
-  if (layers != LayerChoice::kGlobalOnly) {
-    for (const ActivityView* activity : open_newest_first_) {
-      hazard_m = std::fmin(hazard_m, activity->local->PendingHazardAt(point));
-    }
-  }
-  seabed = JoinLayers(point, layers);
-  if (seabed.has_value()) {
-    seabed->estimate.hazard_m = std::fmin(seabed->estimate.hazard_m, hazard_m);
+  for (const ActivityView* activity : open_newest_first_) {
+    if (!activity->local->any_pending()) continue;
+    // fmin: of a NaN and a number the number.
+    seabed->estimate.hazard_m = std::fmin(
+        seabed->estimate.hazard_m, activity->local->PendingHazardAt(point));
   }
   return seabed;
 }
 
 std::optional<SeabedEstimate> ObstacleMapView::JoinLayers(
     const GeodeticPoint& point, LayerChoice layers) const {
+  // One variable on all ways out, filled where it stands: a copy would wait for
+  // its parts to leave the store buffer.
+  std::optional<SeabedEstimate> seabed;
   std::optional<SeabedEstimate> smoothed;
   if (layers != LayerChoice::kGlobalOnly) {
     for (const ActivityView* activity : open_newest_first_) {
       const std::optional<DepthEstimate> local = activity->local->At(point);
-      if (IsMeasured(local)) {
-        return FromActivity(*local, *activity);
+      if (!local.has_value()) continue;
+      if (local->kind == EvidenceKind::kMeasured) {
+        seabed = FromActivity(*local, *activity);
+        return seabed;
       }
-      if (local.has_value() &&
-          (!smoothed.has_value() || local->std_m < smoothed->estimate.std_m)) {
+      if (!smoothed.has_value() || local->std_m < smoothed->estimate.std_m) {
         smoothed = FromActivity(*local, *activity);
       }
     }
   }
-  std::optional<DepthEstimate> chart;
   if (layers != LayerChoice::kLocalOnly) {
-    chart = parts_.global.At(point);
-  }
-  if (IsMeasured(chart) || (chart.has_value() && !smoothed.has_value()) ||
-      (chart.has_value() && chart->kind == EvidenceKind::kLand)) {
-    return SeabedEstimate{.estimate = *chart};
+    DepthEstimate& chart = seabed.emplace().estimate;
+    // Smoothing may know less of a place than a good chart does.
+    if (parts_.global.Read(point, chart) &&
+        (!smoothed.has_value() || chart.kind == EvidenceKind::kMeasured ||
+         chart.kind == EvidenceKind::kLand ||
+         chart.std_m < smoothed->estimate.std_m)) {
+      return seabed;
+    }
+    seabed.reset();
   }
   if (smoothed.has_value()) {
-    // Smoothing may know less of a place than a good chart does.
-    if (chart.has_value() && chart->std_m < smoothed->estimate.std_m) {
-      return SeabedEstimate{.estimate = *chart};
-    }
-    return smoothed;
+    seabed = smoothed;
+    return seabed;
   }
-  if (layers != LayerChoice::kGlobalOnly) {
-    for (const ActivityView* activity : open_newest_first_) {
-      const std::optional<DepthEstimate> prior =
-          activity->local->DefaultPrior();
-      if (prior.has_value() && activity->local->Contains(point)) {
-        return FromActivity(*prior, *activity);
-      }
+  if (layers == LayerChoice::kGlobalOnly) return seabed;
+  for (const ActivityView* activity : open_newest_first_) {
+    const std::optional<DepthEstimate> prior = activity->local->DefaultPrior();
+    if (prior.has_value() && activity->local->Contains(point)) {
+      seabed = FromActivity(*prior, *activity);
+      return seabed;
     }
   }
-  return std::nullopt;
+  return seabed;
 }
 
 std::optional<SeabedEstimate> ObstacleMapView::SeabedInActivity(

@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_format.h"
 #include "map/query/disc_probability.h"
+#include "map/query/tabulated_normal.h"
 
 namespace fathom::map {
 namespace {
@@ -64,6 +65,8 @@ void Tell(ContactReason reason, std::vector<ContactReason>& told) {
 
 }  // namespace
 
+ObstacleAnswer::ObstacleAnswer() = default;
+
 absl::Status ValidateQuery(const ObstacleQuery& query) {
   if (absl::Status status = ValidateGeodetic(query.position); !status.ok()) {
     return status;
@@ -91,9 +94,11 @@ double StaticProbability(const DepthEstimate& estimate, double solid_above_m,
   if (estimate.kind == EvidenceKind::kLand) return 1.0;
   const double std_m = static_cast<double>(estimate.std_m);
   const double above_m = solid_above_m - static_cast<double>(estimate.depth_m);
-  const double variance_m2 = std_m * std_m + model.ageing_rate_m2_s * age_s;
-  if (!(variance_m2 > 0.0)) return above_m >= 0.0 ? 1.0 : 0.0;
-  return NormalCdf(above_m / std::sqrt(variance_m2));
+  const double aged_m2 = model.ageing_rate_m2_s * age_s;
+  const double aged_std_m =
+      aged_m2 == 0.0 ? std_m : std::sqrt(std_m * std_m + aged_m2);
+  if (!(aged_std_m > 0.0)) return above_m >= 0.0 ? 1.0 : 0.0;
+  return TabulatedNormalCdf(above_m / aged_std_m);
 }
 
 ObstacleState ClassifyProbability(double probability, double confidence,

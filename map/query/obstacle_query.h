@@ -106,6 +106,10 @@ inline constexpr std::size_t kMostContactReasons = 16;
 
 // One answer.
 struct ObstacleAnswer {
+  // Defined out of line: a constructor that the compiler sees to be constant
+  // clears the whole object first (5 ns a query).
+  ObstacleAnswer();
+
   ObstacleState state = ObstacleState::kUnknown;
   // P; where the seabed is unknown the contacts' part alone.
   double probability = 0;

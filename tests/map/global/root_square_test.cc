@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <random>
 
 #include "map/global/thesis_planes.h"
@@ -138,6 +139,34 @@ TEST(RootSquare, AnglesAndPlanesAgreeInASmallSquareToo) {
     const GeodeticPoint p{.latitude_deg = 41.5 + spread(random),
                           .longitude_deg = -71.3 + spread(random)};
     ASSERT_EQ(ThesisSearch(root, p, 14), root.Locate(p, 14));
+  }
+}
+
+// Near its middle the series are used, further out the library's functions:
+// places are the same to 1e-13 of a side on both sides of the seam, and across
+// the antimeridian.
+TEST(RootSquare, SeriesAndFunctionsMeet) {
+  for (const double longitude_deg : {-71.3, 179.9, -179.95}) {
+    FATHOM_ASSERT_OK_AND_ASSIGN(
+        const RootSquare root,
+        RootSquare::CenteredOn(
+            {.latitude_deg = 41.5, .longitude_deg = longitude_deg}, 400e3, 10));
+    const double seam_deg = kSmallRad * 180 / std::numbers::pi;
+    for (const double north : {-1.0, 0.0, 1.0}) {
+      for (const double east : {-1.0, 0.0, 1.0}) {
+        const auto at = [&](double share) {
+          return root
+              .Project({.latitude_deg = 41.5 + north * seam_deg * share,
+                        .longitude_deg = NormalizeLongitudeDeg(
+                            longitude_deg + east * seam_deg * share)})
+              .value();
+        };
+        const SquarePoint inside = at(1 - 1e-14);
+        const SquarePoint outside = at(1 + 1e-14);
+        EXPECT_NEAR(inside.u, outside.u, 1e-13);
+        EXPECT_NEAR(inside.v, outside.v, 1e-13);
+      }
+    }
   }
 }
 
