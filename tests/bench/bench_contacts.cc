@@ -3,10 +3,13 @@
 
 #include <benchmark/benchmark.h>
 
+#include <atomic>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <random>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "map/contacts/contact_map.h"
@@ -138,17 +141,23 @@ ObstacleMap WarmMission(int contacts) {
   return map;
 }
 
-void AskPoints(benchmark::State& state, const ObstacleMapView& view,
-               double step_m) {
+// Points all over a square of `side_m`.
+std::vector<ObstacleQuery> ScatteredQueries(double side_m) {
   std::vector<ObstacleQuery> queries;
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> unit(0, 1);
   for (int i = 0; i < 1024; ++i) {
     queries.push_back(
-        {.position = Place(step_m * unit(random), step_m * unit(random)),
+        {.position = Place(side_m * unit(random), side_m * unit(random)),
          .depth_m = 18,
          .time = At(300)});
   }
+  return queries;
+}
+
+void AskPoints(benchmark::State& state, const ObstacleMapView& view,
+               double side_m) {
+  const std::vector<ObstacleQuery> queries = ScatteredQueries(side_m);
   std::size_t i = 0;
   for (auto _ : state) {
     benchmark::DoNotOptimize(view.Answer(queries[i++ & 1023]));
@@ -163,6 +172,40 @@ void BM_AnswerStatic(benchmark::State& state) {
   AskPoints(state, *map.View(), 500);
 }
 BENCHMARK(BM_AnswerStatic);
+
+// The same while a writer applies pings without pause and publishes a view
+// after every 64; the reader asks the newest.
+void BM_AnswerStaticBesideWriter(benchmark::State& state) {
+  ObstacleMap map = WarmMission(0);
+  std::atomic<std::shared_ptr<const ObstacleMapView>> published(map.View());
+  std::atomic<bool> done = false;
+  std::uint64_t pings = 0;
+  std::thread writer([&] {
+    for (int i = 0; !done; ++i) {
+      if (!map.ApplyPing(HitAt("a", 2.0 * (i % 250), 1.0 * ((37 * i) % 500), 20,
+                               1, 250 + i / 100))
+               .ok()) {
+        std::abort();
+      }
+      if (++pings % 64 == 0) published = map.View();
+    }
+  });
+  const std::vector<ObstacleQuery> queries = ScatteredQueries(500);
+  std::size_t i = 0;
+  for (auto _ : state) {
+    const std::shared_ptr<const ObstacleMapView> view = published;
+    for (int n = 0; n < 64; ++n) {
+      benchmark::DoNotOptimize(view->Answer(queries[i++ & 1023]));
+    }
+  }
+  done = true;
+  writer.join();
+  state.counters["ns_per_query"] = benchmark::Counter(
+      64e-9 * static_cast<double>(state.iterations()),
+      benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  state.counters["pings"] = static_cast<double>(pings);
+}
+BENCHMARK(BM_AnswerStaticBesideWriter);
 
 // The same with 10 000 contacts, none near.
 void BM_AnswerContactsFar(benchmark::State& state) {
