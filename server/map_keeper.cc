@@ -30,9 +30,13 @@ storage::SourcePosition PositionOf(const IngestMessage& message) {
 std::string Describe(map::RejectReason reason, size_t max_contacts) {
   switch (reason) {
     case map::RejectReason::kGated:
-      return "too far from where the contact can be";
+      return "too far from where the contact can be; if the next report agrees "
+             "with it the track begins anew";
     case map::RejectReason::kTooLate:
-      return "older than the newest report about this contact";
+      return absl::StrFormat(
+          "more than %d s or %d reports older than the newest report about "
+          "this contact, or before its drop",
+          map::kLateWindow.count(), map::kRecentReports);
     case map::RejectReason::kContactsFull:
       return absl::StrFormat(
           "the contact list is full: max_contacts=%d are live; drop contacts "
@@ -218,7 +222,7 @@ void MapKeeper::DropContact(map::DropContact event, Done<Nothing> done) {
        event = std::move(event)](StorageItem& item) -> absl::StatusOr<Nothing> {
         FATHOM_ASSIGN_OR_RETURN(map::ContactOutcome outcome, map_->Drop(event));
         item.record = storage::JournalRecord{map_->revision(), event};
-        item.contact_estimate = std::move(outcome.estimate);
+        item.contact_estimates = std::move(outcome.estimates);
         return Nothing{};
       });
 }
@@ -431,9 +435,11 @@ void MapKeeper::ApplyContact(IngestMessage& message, MessageOutcome& outcome,
                        Describe(reason, map_->options().contacts.max_contacts)};
     // A refusal that the map counts is replayed like any other event.
     if (map_->revision() == revision_before) return;
-  } else {
-    item.contact_estimate = std::move(result.estimate);
   }
+  // A refused one may have them too: a late outlier changes what the outlier
+  // after it was taken for.
+  item.contact_estimates = std::move(result.estimates);
+  item.contact_revised = result.revised;
   item.record = storage::JournalRecord{
       map_->revision(),
       storage::ContactRecord{.epoch = message.number.epoch,

@@ -199,7 +199,8 @@ class MapKeeper {
   struct StorageItem {
     // What the journal, the history and the ledger keep of it.
     std::optional<storage::JournalRecord> record;
-    std::optional<map::ContactEstimate> contact_estimate;
+    std::vector<map::ContactEstimate> contact_estimates;
+    bool contact_revised = false;
     std::optional<storage::SourcePosition> position;
     // Set: this view is to be saved whole, and with it how far imports got.
     ViewPtr checkpoint;

@@ -10,8 +10,12 @@
 namespace fathom::storage {
 namespace {
 
-constexpr std::uint8_t kContactVersion = 1;
+// 2 added the recent reports; of an older one there are none.
+constexpr std::uint8_t kContactVersion = 2;
 constexpr std::uint8_t kEstimateVersion = 1;
+
+// A recent report was gated, or gave so many points.
+constexpr std::uint8_t kGatedFate = 3;
 
 enum ReportFlag : std::uint8_t {
   kIsFix = 1,
@@ -169,6 +173,11 @@ Bytes EncodeContact(const map::StoredContact& contact) {
   writer.PutString(contact.key.contact.value);
   writer.PutVarint(contact.estimates.size());
   PutRows(rows.bytes(), kContactPointBytes, writer);
+  writer.PutVarint(contact.recent.size());
+  for (const map::RecentReport& recent : contact.recent) {
+    writer.PutU8(recent.gated ? kGatedFate : recent.points);
+    PutContactReport(recent.report, writer);
+  }
   return SealBlob(BlobKind::kContact, kContactVersion, std::move(writer));
 }
 
@@ -183,6 +192,16 @@ absl::StatusOr<map::StoredContact> DecodeContact(ByteSpan blob,
   contact.key.contact.value = reader.GetString();
   const std::size_t count = reader.GetCount(map::kRecentEstimates);
   const Bytes bytes = GetRows(reader, count, kContactPointBytes);
+  if (blob[1] >= 2) {
+    contact.recent.resize(reader.GetCount(map::kRecentReports));
+    for (map::RecentReport& recent : contact.recent) {
+      const std::uint8_t fate = reader.GetU8();
+      if (fate > kGatedFate) reader.Fail();
+      recent.gated = fate == kGatedFate;
+      recent.points = recent.gated ? 0 : fate;
+      GetContactReport(reader, recent.report);
+    }
+  }
   FATHOM_RETURN_IF_ERROR(reader.Finish(what));
   ByteReader rows(bytes);
   contact.estimates.resize(count);

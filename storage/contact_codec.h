@@ -27,7 +27,7 @@ Bytes EncodeContactPoint(const map::ContactPoint& point);
 absl::StatusOr<map::ContactPoint> DecodeContactPoint(ByteSpan blob,
                                                      std::string_view what);
 
-// A contact with its recent estimates.
+// A contact with its recent estimates and reports.
 // REQUIRES: 1 to map::kRecentEstimates estimates.
 Bytes EncodeContact(const map::StoredContact& contact);
 // Errors: DATA_LOSS naming `what`; UNIMPLEMENTED for a newer version.

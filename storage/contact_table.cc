@@ -47,6 +47,10 @@ absl::StatusOr<ContactTable> ContactTable::Create(Connection& connection) {
           "velocity_north_m_s, velocity_east_m_s, content) VALUES (?, ?, ?, "
           "?, ?, ?, ?, ?, ?, ?)"));
   FATHOM_ASSIGN_OR_RETURN(
+      table.revise_,
+      connection.Prepare("DELETE FROM contact_history WHERE contact_number = ? "
+                         "AND time_us >= ? AND revision < ?"));
+  FATHOM_ASSIGN_OR_RETURN(
       table.write_state_,
       connection.Prepare("UPDATE contact SET content = ? WHERE "
                          "contact_number = ?"));
@@ -74,6 +78,12 @@ absl::StatusOr<std::int64_t> ContactTable::NumberOf(
 absl::Status ContactTable::AppendHistory(const ContactHistoryRow& row) {
   const map::ContactEstimate& estimate = row.estimate;
   FATHOM_ASSIGN_OR_RETURN(const std::int64_t number, NumberOf(estimate.key));
+  if (row.revises) {
+    revise_.BindInt(0, number);
+    revise_.BindInt(1, ToUnixMicros(estimate.time));
+    revise_.BindUint(2, row.revision);
+    FATHOM_RETURN_IF_ERROR(revise_.Run());
+  }
   const map::GeodeticPoint position = estimate.Position();
   const Bytes content = EncodeContactPoint(estimate);
   append_.BindInt(0, number);

@@ -30,6 +30,7 @@ class ContactTable {
   // `connection` must outlive it.
   static absl::StatusOr<ContactTable> Create(Connection& connection);
 
+  // Of rows of one contact, time and revision the last stays.
   absl::Status AppendHistory(const ContactHistoryRow& row);
   // What the map holds of the contact (EncodeContact).
   absl::Status WriteState(const map::ContactKey& key, ByteSpan content);
@@ -51,6 +52,7 @@ class ContactTable {
   Statement find_;
   Statement add_;
   Statement append_;
+  Statement revise_;
   Statement write_state_;
 };
 

@@ -113,9 +113,12 @@ struct JournalRecord {
 
 // What was believed of a contact after one of its reports or its drop.
 struct ContactHistoryRow {
-  // Revision of the map after it: rows of one contact differ in it.
+  // Revision of the map after it.
   std::uint64_t revision = 0;
   map::ContactEstimate estimate;
+  // Takes the place of this contact's rows of earlier revisions at its time
+  // and later: a late report changed what is believed from there on.
+  bool revises = false;
 };
 
 // A state of the map to be written whole.

@@ -7,6 +7,10 @@
 // makes it kDropped. A report about a contact that is stale or dropped starts
 // the track anew; the former life stays in the history.
 //
+// The past between reports is smoothed, not extrapolated (Rauch, Tung, Striebel
+// 1965, "Maximum likelihood estimates of linear dynamic systems", AIAA J. 3(8),
+// 1445-1450): it grows surer as reports come in after it.
+//
 // Each estimate lives in the north-east plane of its own frame_origin: the
 // place of the first report, moved along when the contact has gone further
 // than kReanchorM, or of the last fix. Everything is doubles, so that storing
@@ -18,16 +22,16 @@
 #define FATHOM_MAP_CONTACTS_CONTACT_H_
 
 #include <Eigen/Core>
-#include <array>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <vector>
 
 #include "base/time.h"
 #include "map/contacts/contact_class.h"
-#include "map/contacts/filter.h"
+#include "map/contacts/contact_report.h"
+#include "map/contacts/shared_log.h"
 #include "map/geodesy/ids.h"
 #include "map/geodesy/points.h"
 
@@ -87,45 +91,45 @@ struct ContactEstimate : ContactPoint {
                          const ContactEstimate&) = default;
 };
 
-// The newest estimates of one contact, oldest first, at most
-// kRecentEstimates. Copying shares them: copies cost O(kRecentEstimates / 16).
-//
-// Chunks of 16 are shared between all copies and filled from the front; a
-// copy reads only below its own size, so the writer may fill the slots above
-// while readers read. REQUIRES therefore: of all copies of a history only the
-// longest is ever appended to (the writer's, which published the others).
-class TrackHistory {
+// The newest estimates of one contact, oldest first, at most kRecentEstimates.
+class TrackHistory : public SharedLog<ContactPoint, kRecentEstimates> {
  public:
-  std::size_t size() const { return end_ - begin_; }
-  bool empty() const { return end_ == begin_; }
-  // REQUIRES: i < size(). 0 is the oldest.
-  const ContactPoint& operator[](std::size_t i) const {
-    const std::size_t slot = begin_ + i;
-    return chunks_[slot / kChunk]->points[slot % kChunk];
-  }
-  const ContactPoint& newest() const { return (*this)[size() - 1]; }
-  // Adds one behind the newest; forgets the oldest beyond kRecentEstimates.
-  void Append(const ContactPoint& point);
   // Index of the newest point with time <= t; nullopt if all are later. Of
   // several at t the last. O(log size).
   std::optional<std::size_t> NewestAtOrBefore(Time t) const;
-
- private:
-  static constexpr std::size_t kChunk = 16;
-  struct Chunk {
-    std::array<ContactPoint, kChunk> points;
-  };
-  std::vector<std::shared_ptr<Chunk>> chunks_;
-  // Slots [begin_, end_) counted from the first chunk held.
-  std::size_t begin_ = 0;
-  std::size_t end_ = 0;
 };
 
+// Late reports are taken if they are not older than this beside the newest
+// report about the contact: what a slow link or a second receiver delays. An
+// hour-old report would rewrite what was answered to planners for an hour.
+inline constexpr std::chrono::seconds kLateWindow{60};
+
+// And not older than the newest so many reports, which must be kept.
+inline constexpr std::size_t kRecentReports = 64;
+
+// A report that was fused or gated, kept so that an earlier one that comes
+// late can be put before it and the track be made anew.
+struct RecentReport {
+  // `key` is empty: it is the contact's.
+  ContactReport report;
+  // Refused by the innovation gate; it is then no part of the track yet.
+  bool gated = false;
+  // Points of the history that came of it: 0 (gated, or a contact that was
+  // gone already), 1, or 2 where the track began anew (tracker.h).
+  std::uint8_t points = 0;
+
+  friend bool operator==(const RecentReport&, const RecentReport&) = default;
+};
+using RecentReports = SharedLog<RecentReport, kRecentReports>;
+
 // A contact as stored: its newest estimates, oldest first, 1 to
-// kRecentEstimates of them (of more, the newest are taken).
+// kRecentEstimates of them (of more, the newest are taken), and the reports of
+// late behind them.
 struct StoredContact {
   ContactKey key;
   std::vector<ContactEstimate> estimates;
+  // In order of time, at most kRecentReports.
+  std::vector<RecentReport> recent;
 };
 
 // See file comment.
@@ -140,10 +144,18 @@ class Contact {
   const ContactPoint& newest() const { return history_.newest(); }
   bool dropped() const { return newest().status == ContactStatus::kDropped; }
 
-  // The contact at `t`: the newest estimate at or before it, predicted on.
+  // The reports of late, in order of time; REQUIRES of them what
+  // RecentReport says. Since the last Drop by command only.
+  const RecentReports& recent() const { return recent_; }
+  // The time of the newest report or drop. REQUIRES: a history.
+  Time LastTime() const;
+
+  // The contact at `t`. After the newest estimate: that one predicted on;
+  // kStale if silent too long. Between two of one life: smoothed, that is by
+  // what was heard before and after (at most kSmoothedAhead estimates after).
   // Absent before the first report and from a drop to the next report. Before
   // the oldest estimate that is kept, if that life was running: predicted
-  // back from it. kStale if silent too long at `t`. O(log kept).
+  // back from it. O(log kept); the past up to 15 us.
   std::optional<ContactPoint> At(Time t,
                                  const ContactClassTable& classes) const;
 
@@ -154,12 +166,27 @@ class Contact {
   ContactEstimate NewestEstimate() const;
   StoredContact ToStored() const;
 
-  void Append(const ContactPoint& point) { history_.Append(point); }
+  // For the holder (ContactSet).
+  TrackHistory& history() { return history_; }
+  RecentReports& recent() { return recent_; }
 
  private:
+  // What is believed of history_[index] after up to kSmoothedAhead later ones
+  // of the same life, in its own plane.
+  ContactPoint Smoothed(std::size_t index,
+                        const ContactClassTable& classes) const;
+
   ContactKey key_;
   TrackHistory history_;
+  RecentReports recent_;
 };
+
+// What lies further ahead than so many estimates does not help the past.
+inline constexpr std::size_t kSmoothedAhead = 32;
+
+// The point in a plane that touches the Earth at `origin`: the same place,
+// velocity and uncertainty. REQUIRES: within 3000 km of it.
+ContactPoint InPlaneAt(const ContactPoint& point, const GeodeticPoint& origin);
 
 // The point moved on (or back) to `t` under its class's process noise;
 // `time` becomes t, the rest stays.

@@ -48,26 +48,26 @@ ContactBlock& ContactSet::OwnBlock(std::size_t block) {
   return *held;
 }
 
-void ContactSet::Append(const ContactKey& key, const ContactPoint& point) {
+void ContactSet::Change(const ContactKey& key, ContactChange kind,
+                        absl::FunctionRef<void(Contact&)> change) {
   const Place place = Find(key);
-  if (!place.found) {
-    auto contact = std::make_shared<Contact>(key);
-    contact->Append(point);
-    Add(std::move(contact));
-    return;
-  }
   HeldContact& held = OwnBlock(place.block).contacts[place.slot];
   const bool was_live = !held.contact->dropped();
-  const std::optional<SpatialEntry> before =
+  std::optional<SpatialEntry> entry =
       index.Remove(held.contact.get(), held.code, epoch);
   if (held.epoch != epoch) {
     held.contact = std::make_shared<Contact>(*held.contact);
     held.epoch = epoch;
   }
-  held.contact->Append(point);
-  const SpatialEntry entry = MakeSpatialEntry(*held.contact, *classes, before);
-  held.code = entry.code;
-  index.Insert(entry, epoch);
+  change(*held.contact);
+  if (kind == ContactChange::kReports && entry.has_value()) {
+    entry->contact = held.contact.get();
+  } else {
+    if (kind != ContactChange::kAppend) entry.reset();
+    entry = MakeSpatialEntry(*held.contact, *classes, entry);
+  }
+  held.code = entry->code;
+  index.Insert(*entry, epoch);
   if (was_live) --live_count;
   if (!held.contact->dropped()) ++live_count;
 }

@@ -13,6 +13,7 @@
 #include <memory>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
 #include "map/contacts/contact.h"
 #include "map/contacts/contact_class.h"
 #include "map/contacts/spatial_index.h"
@@ -37,6 +38,13 @@ struct ContactBlock {
   std::vector<HeldContact> contacts;
 };
 
+// What is done to a contact that is held.
+enum class ContactChange {
+  kReports,  // To its recent reports only.
+  kAppend,   // One point is appended to its history.
+  kRevise,   // Anything.
+};
+
 struct ContactSet {
   std::uint64_t epoch = 0;
   // In order of key.
@@ -59,9 +67,11 @@ struct ContactSet {
 
   // The rest changes the set. REQUIRES: `epoch` is the current one.
 
-  // Appends a point to the contact, which is added if needed.
-  void Append(const ContactKey& key, const ContactPoint& point);
-  // Adds a contact. REQUIRES: its key is not held.
+  // Lets `change` do to the contact what `kind` says. REQUIRES: held; a
+  // history after it.
+  void Change(const ContactKey& key, ContactChange kind,
+              absl::FunctionRef<void(Contact&)> change);
+  // Adds a contact. REQUIRES: its key is not held; a history.
   void Add(std::shared_ptr<Contact> contact);
   // Forgets the contact. REQUIRES: held.
   void Erase(const ContactKey& key);

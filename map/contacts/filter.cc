@@ -1,7 +1,10 @@
 #include "map/contacts/filter.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <cmath>
+#include <limits>
+#include <numbers>
 #include <string>
 
 #include "absl/status/status.h"
@@ -132,6 +135,59 @@ PositionMeasurement ConvertUnbiased(const PolarMeasurement& polar) {
           .R = AlongRay(cos_a, sin_a, along, across)};
 }
 
+PositionMeasurement ConvertAbout(const PolarMeasurement& polar,
+                                 const PositionMeasurement& known) {
+  const Eigen::Vector2d& p = known.z;
+  if (!IsDirectionKnown(known)) return ConvertUnbiased(polar);
+  const double s = polar.azimuth_std_rad * polar.azimuth_std_rad;
+  const Eigen::Matrix2d M = p * p.transpose() + known.R;
+  Eigen::Matrix2d turned;  // J M J'.
+  turned << M(1, 1), -M(0, 1), -M(0, 1), M(0, 0);
+  const double g = polar.range_std_m * polar.range_std_m / M.trace();
+  const double half = std::sinh(0.5 * s);
+  const double stretched_m = std::exp(0.5 * s) * polar.range_m;
+  return {.z = {stretched_m * std::cos(polar.azimuth_rad),
+                stretched_m * std::sin(polar.azimuth_rad)},
+          .R = (2.0 * half * half + std::cosh(s) * g) * M +
+               std::sinh(s) * (1.0 + g) * turned};
+}
+
+bool IsDirectionKnown(const PositionMeasurement& known) {
+  return known.R.trace() <=
+         kKnownDirection * kKnownDirection * known.z.squaredNorm();
+}
+
+PositionMeasurement ConvertAgain(const PolarMeasurement& polar,
+                                 const PositionMeasurement& known,
+                                 const PositionMeasurement& first) {
+  const Eigen::Matrix2d S = known.R + first.R;
+  const Eigen::Matrix2d K = known.R * S.inverse();
+  PositionMeasurement led{.z = known.z + K * (first.z - known.z),
+                          .R = known.R - K * known.R};
+  led.R(1, 0) = led.R(0, 1);
+  return ConvertAbout(polar, led);
+}
+
+double PolarNis(const PolarMeasurement& polar,
+                const PositionMeasurement& known) {
+  const double range_m = known.z.norm();
+  if (range_m == 0.0) return std::numeric_limits<double>::infinity();
+  const Eigen::Vector2d along = known.z / range_m;
+  const Eigen::Vector2d across(-along.y(), along.x());
+  const double d_range_m = polar.range_m - range_m;
+  const double d_azimuth_rad =
+      std::remainder(polar.azimuth_rad - std::atan2(along.y(), along.x()),
+                     2 * std::numbers::pi);
+  const double rr =
+      along.dot(known.R * along) + polar.range_std_m * polar.range_std_m;
+  const double ra = along.dot(known.R * across) / range_m;
+  const double aa = across.dot(known.R * across) / (range_m * range_m) +
+                    polar.azimuth_std_rad * polar.azimuth_std_rad;
+  return (aa * d_range_m * d_range_m - 2 * ra * d_range_m * d_azimuth_rad +
+          rr * d_azimuth_rad * d_azimuth_rad) /
+         (rr * aa - ra * ra);
+}
+
 PositionMeasurement ConvertPlain(const PolarMeasurement& polar) {
   const double cos_a = std::cos(polar.azimuth_rad);
   const double sin_a = std::sin(polar.azimuth_rad);
@@ -145,6 +201,27 @@ UpdatedState Update(FilterKind kind, const TrackState& state,
                     const PositionMeasurement& measurement) {
   return kind == FilterKind::kPerAxis ? UpdatePerAxis(state, measurement)
                                       : UpdateFourState(state, measurement);
+}
+
+double PositionNis(FilterKind kind, const TrackState& state,
+                   const PositionMeasurement& measurement) {
+  const Eigen::Vector2d innovation = measurement.z - state.x.head<2>();
+  Eigen::Matrix2d S = state.P.topLeftCorner<2, 2>() + measurement.R;
+  if (kind == FilterKind::kPerAxis) S(0, 1) = S(1, 0) = 0.0;
+  return innovation.dot(S.inverse() * innovation);
+}
+
+TrackState SmoothBack(const TrackState& state, double dt_s,
+                      const TrackState& predicted, const TrackState& smoothed) {
+  // Gain P F' (predicted P)^-1, transposed.
+  Eigen::Matrix4d moved = state.P;  // P F'.
+  moved.leftCols<2>() += dt_s * state.P.rightCols<2>();
+  const Eigen::Matrix4d gain_t = predicted.P.ldlt().solve(moved.transpose());
+  TrackState back;
+  back.x = state.x + gain_t.transpose() * (smoothed.x - predicted.x);
+  back.P = state.P + gain_t.transpose() * (smoothed.P - predicted.P) * gain_t;
+  Symmetrize(back.P);
+  return back;
 }
 
 TrackState FirstState(const PositionMeasurement& measurement,

@@ -79,6 +79,39 @@ struct PositionMeasurement {
 // in the ray's own axes: positive definite and without cancellation.
 PositionMeasurement ConvertUnbiased(const PolarMeasurement& polar);
 
+// The conversion of kFourState once the contact is tracked: about the place
+// predicted instead of about the place measured. `known` is the prediction
+// less the sensor's place, known.P its covariance (the sensor's included).
+// With M = E[p p'] = p p' + P of that place, J a quarter turn, g = sr^2 / tr M:
+//   z = e^(s/2) r [cos a, sin a],
+//   R = (2 sinh^2(s/2) + cosh(s) g) M + sinh(s) (1 + g) J M J',
+// the best linear use of z, given that (after Bordonaro, Willett, Bar-Shalom
+// 2014, "Decorrelated unbiased converted measurement Kalman filter", IEEE
+// Trans. AES 50(2), 1431-1444). R does not depend on the noise of z. Where it
+// does (ConvertUnbiased) a bearing that errs towards the track is trusted as
+// much along the ray as one that errs away: at 10 km and 5 degrees the mean
+// NEES is 7.2 instead of 4.4 and the error a sixth greater (docs/adr).
+// Where `known` says less of the direction than kKnownDirection,
+// ConvertUnbiased. REQUIRES: known.R positive definite.
+PositionMeasurement ConvertAbout(const PolarMeasurement& polar,
+                                 const PositionMeasurement& known);
+inline constexpr double kKnownDirection = 0.5;  // sqrt(tr P) / |p|.
+bool IsDirectionKnown(const PositionMeasurement& known);
+
+// ConvertAbout a second time, about the place that the first time leads to:
+// where the bearing is vague it is the better place (mean NEES 4.3 after 4.4 at
+// 10 km and 10 degrees). REQUIRES: IsDirectionKnown(known), `first` is
+// ConvertAbout(polar, known).
+PositionMeasurement ConvertAgain(const PolarMeasurement& polar,
+                                 const PositionMeasurement& known,
+                                 const PositionMeasurement& first);
+
+// Normalised innovation squared of the range and bearing as they are against
+// the place known (first order there): chi^2 with 2 degrees of freedom. What
+// is bent north and east is straight here, and the other way about.
+double PolarNis(const PolarMeasurement& polar,
+                const PositionMeasurement& known);
+
 // The thesis's conversion: z = r [cos a, sin a] (inverse of eqs. 5.26, 5.27)
 // with first-order noise: sr^2 along the ray, (r s_a)^2 across it.
 PositionMeasurement ConvertPlain(const PolarMeasurement& polar);
@@ -95,6 +128,16 @@ struct UpdatedState {
 // symmetric, P + R positive definite.
 UpdatedState Update(FilterKind kind, const TrackState& state,
                     const PositionMeasurement& measurement);
+
+// Normalised innovation squared of a position, as Update would tell it.
+double PositionNis(FilterKind kind, const TrackState& state,
+                   const PositionMeasurement& measurement);
+
+// One step back of a fixed-interval smoother (Rauch, Tung, Striebel 1965): the
+// estimate `state`, dt_s >= 0 before a later one of which `predicted` was
+// foretold from it (Predict by dt_s) and `smoothed` is believed now.
+TrackState SmoothBack(const TrackState& state, double dt_s,
+                      const TrackState& predicted, const TrackState& smoothed);
 
 // The state of a contact that was heard once: there, velocity
 // N(0, velocity_std^2) per axis.

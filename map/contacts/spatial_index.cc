@@ -81,6 +81,28 @@ Reach ReachOf(const ContactPoint& point, const ContactClassTable& classes) {
           .wander_m_s15 = kNearSigmas * std::sqrt(q / 3.0)};
 }
 
+// Between two estimates the past is smoothed: it may lie where neither said.
+// By how much the reach of the first is widened: what came later moves it by
+// no more than kGateSigmas or so (12.5 / 7.5), and a fix draws it along by what
+// it was off.
+constexpr double kSmoothedReach = 1.7;
+constexpr double kSmoothedDraw = 1.5;
+
+// How far from `point` the contact may be found until `next` came.
+double ReachUntil(const ContactPoint& point, const ContactPoint& next,
+                  const ContactClassTable& classes) {
+  const double span_s = ToSeconds(next.time - point.time);
+  const double draw_m =
+      point.frame_origin == next.frame_origin
+          ? (next.x.head<2>() - point.x.head<2>() - span_s * point.x.tail<2>())
+                .norm()
+          : DistanceM(ToUnitVector(next.Position()),
+                      ToUnitVector(point.Position())) +
+                span_s * point.x.tail<2>().norm();
+  return kSmoothedReach * ReachOf(point, classes).After(span_s) +
+         kSmoothedDraw * draw_m;
+}
+
 // How far from `place`, the newest, the contact may have been at any time
 // before: each estimate is asked until the next one came, the oldest also
 // back to the start of its life.
@@ -90,12 +112,13 @@ double PastAfresh(const TrackHistory& history, const UnitVector& place,
   double past_m = 0;
   for (std::size_t i = 0; i < history.size(); ++i) {
     const ContactPoint& point = history[i];
-    double span_s = 0;
+    double reach_m = 0;
     if (i + 1 < history.size()) {
-      span_s = ToSeconds(history[i + 1].time - point.time);
+      reach_m = ReachUntil(point, history[i + 1], classes);
     }
     if (i == 0) {
-      span_s = std::max(span_s, ToSeconds(point.time - point.track_start));
+      const double back_s = ToSeconds(point.time - point.track_start);
+      reach_m = std::max(reach_m, ReachOf(point, classes).After(back_s));
     }
     // On one plane the difference will do (1.1: what the plane shortens).
     const double distance_m =
@@ -103,8 +126,7 @@ double PastAfresh(const TrackHistory& history, const UnitVector& place,
             ? 1.1 *
                   std::hypot(point.x(0) - newest.x(0), point.x(1) - newest.x(1))
             : DistanceM(place, ToUnitVector(point.Position()));
-    past_m =
-        std::max(past_m, distance_m + ReachOf(point, classes).After(span_s));
+    past_m = std::max(past_m, distance_m + reach_m);
   }
   return past_m;
 }
@@ -114,9 +136,8 @@ double PastFrom(const TrackHistory& history, const SpatialEntry& before,
                 const UnitVector& place, const ContactClassTable& classes) {
   const double moved_m = DistanceM(place, before.bounds.low);
   const ContactPoint& last = history[history.size() - 2];
-  const double span_s = ToSeconds(history.newest().time - last.time);
   return moved_m + std::max(static_cast<double>(before.bounds.past_m),
-                            ReachOf(last, classes).After(span_s));
+                            ReachUntil(last, history.newest(), classes));
 }
 
 }  // namespace

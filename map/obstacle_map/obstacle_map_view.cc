@@ -87,6 +87,12 @@ void AddContact(const Contact& contact, Digest64& digest) {
   for (std::size_t i = 0; i < history.size(); ++i) {
     AddPoint(history[i], digest);
   }
+  for (std::size_t i = 0; i < contact.recent().size(); ++i) {
+    const RecentReport& recent = contact.recent()[i];
+    digest.Add(
+        static_cast<uint64_t>(recent.report.time.time_since_epoch().count()));
+    digest.Add(uint64_t{recent.points} << 1 | (recent.gated ? 1u : 0u));
+  }
 }
 
 }  // namespace

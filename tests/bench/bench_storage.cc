@@ -139,7 +139,8 @@ void BM_CommitContacts(benchmark::State& state) {
     Batch batch;
     for (int i = 0; i < 1000; ++i) {
       ++revision;
-      ContactHistoryRow row{.revision = revision, .estimate = {}};
+      ContactHistoryRow row{
+          .revision = revision, .estimate = {}, .revises = false};
       static_cast<map::ContactPoint&>(row.estimate) = SampleContactPoint(1);
       row.estimate.frame_origin = {.latitude_deg = 41, .longitude_deg = -70};
       row.estimate.time = TimeFromUnixMicros(static_cast<int>(revision));

@@ -177,7 +177,8 @@ TEST_F(MapKeeperTest, EverythingThatWaitsIsOneCommit) {
 TEST_F(MapKeeperTest, ContactReportsGiveAHistoryAndRefusalsTheirReason) {
   Submit(FixMessage(2, "m1"));
   IngestMessage late = FixMessage(3, "m1");
-  std::get<map::ContactReport>(late.content).time = kStart;
+  std::get<map::ContactReport>(late.content).time =
+      kStart - std::chrono::seconds(59);  // 61 s before the first.
   Submit(std::move(late));
   const auto outcomes = listener_->AwaitApplied(2);
   EXPECT_EQ(outcomes[0].fate, MessageFate::kApplied);
@@ -191,6 +192,22 @@ TEST_F(MapKeeperTest, ContactReportsGiveAHistoryAndRefusalsTheirReason) {
   EXPECT_EQ(keeper_->View()->counters().contact_rejects.count(
                 map::RejectReason::kTooLate),
             1U);
+}
+
+TEST_F(MapKeeperTest, LateContactReportRewritesTheHistoryBehindIt) {
+  Submit(FixMessage(2, "m1"));
+  Submit(FixMessage(9, "m1"));
+  IngestMessage late = FixMessage(10, "m1");
+  std::get<map::ContactReport>(late.content).time =
+      kStart + std::chrono::seconds(5);
+  Submit(std::move(late));
+  const auto outcomes = listener_->AwaitApplied(3);
+  EXPECT_EQ(outcomes[2].fate, MessageFate::kApplied);
+  listener_->AwaitDurable(3);
+  size_t history = 0;
+  for (const SeenBatch& batch : store_.seen()) history += batch.history;
+  // One each, then the one before the late one, itself and the one after.
+  EXPECT_EQ(history, 5U);
 }
 
 TEST_F(MapKeeperTest, CommandsTellTheirResultWhenDurable) {

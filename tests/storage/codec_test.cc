@@ -206,18 +206,50 @@ TEST(ContactCodec, ContactComesBackBitForBit) {
       estimate.key = contact.key;
       contact.estimates.push_back(estimate);
     }
+    for (int i = 0; i < std::min(count, 64); ++i) {
+      map::RecentReport recent{.report = SampleReport(i, ""),
+                               .gated = i % 3 == 2,
+                               .points = static_cast<std::uint8_t>(i % 3)};
+      if (recent.gated) recent.points = 0;
+      recent.report.key = {};
+      contact.recent.push_back(recent);
+    }
     FATHOM_ASSERT_OK_AND_ASSIGN(const map::StoredContact back,
                                 DecodeContact(EncodeContact(contact), "c"));
     EXPECT_EQ(back.key, contact.key);
     EXPECT_EQ(back.estimates, contact.estimates);
+    EXPECT_EQ(back.recent, contact.recent);
     EXPECT_TRUE(std::signbit(back.estimates[0].frame_origin.longitude_deg));
   }
+}
+
+TEST(ContactCodec, VersionOneHasNoRecentReports) {
+  map::StoredContact contact;
+  contact.key = {.source = {"radar"}, .contact = {"c"}};
+  contact.estimates.resize(1);
+  static_cast<map::ContactPoint&>(contact.estimates[0]) = SampleContactPoint(3);
+  contact.estimates[0].key = contact.key;
+  const Bytes now = EncodeContact(contact);
+  // A version 1 payload ends where version 2 tells its count, 0 here.
+  ASSERT_EQ(now.back(), 0);
+  ByteWriter writer = StartBlob();
+  for (std::size_t i = kBlobHeaderBytes; i + 1 < now.size(); ++i) {
+    writer.PutU8(now[i]);
+  }
+  FATHOM_ASSERT_OK_AND_ASSIGN(
+      const map::StoredContact back,
+      DecodeContact(SealBlob(BlobKind::kContact, 1, std::move(writer)), "c"));
+  EXPECT_EQ(back.estimates, contact.estimates);
+  EXPECT_TRUE(back.recent.empty());
 }
 
 TEST(ContactCodec, DamageNeverCrashes) {
   map::StoredContact contact;
   contact.key = {.source = {"radar"}, .contact = {"c"}};
   contact.estimates.resize(30);
+  for (int i = 0; i < 5; ++i) {
+    contact.recent.push_back({.report = SampleReport(i, "c")});
+  }
   ExpectNoCrash(EncodeContact(contact), BlobKind::kContact,
                 [](ByteSpan blob) { DecodeContact(blob, "c").IgnoreError(); });
 }

@@ -84,8 +84,9 @@ class EventScript {
                                                 i % 2 == 0 ? "even" : "odd")};
     const map::ContactOutcome outcome = map_.ApplyContact(record.report);
     Require(outcome.applied);
-    batch_.contact_history.push_back(
-        {.revision = i, .estimate = outcome.estimate.value()});
+    batch_.contact_history.push_back({.revision = i,
+                                      .estimate = outcome.estimate.value(),
+                                      .revises = false});
     batch_.journal.push_back({i, std::move(record)});
   }
 

@@ -408,6 +408,47 @@ TEST_F(MissionMapTest, ContactHistoryIsReadByTimeRange) {
               StatusIs(absl::StatusCode::kNotFound));
 }
 
+TEST_F(MissionMapTest, RevisedHistoryTakesThePlaceOfWhatStoodThere) {
+  const map::ContactKey key{.source = {"c4i"}, .contact = {"a"}};
+  const auto row = [&key](int s, std::uint64_t revision, bool revises) {
+    ContactHistoryRow made{
+        .revision = revision, .estimate = {}, .revises = revises};
+    static_cast<map::ContactPoint&>(made.estimate) = SampleContactPoint(1);
+    made.estimate.key = key;
+    made.estimate.time = TimeFromUnixMicros(s * 1'000'000ll);
+    return made;
+  };
+  Batch batch;
+  batch.contact_history = {row(10, 1, false), row(20, 2, false),
+                           row(30, 3, false)};
+  ContactHistoryRow other = row(30, 3, false);
+  other.estimate.key.contact.value = "b";
+  batch.contact_history.push_back(other);
+  // A report of 15 s came as revision 4; the one of 30 s is no more.
+  batch.contact_history.push_back(row(10, 4, true));
+  batch.contact_history.push_back(row(15, 4, false));
+  batch.contact_history.push_back(row(20, 4, false));
+  ASSERT_THAT(file_->Commit(batch), IsOk());
+  std::vector<std::pair<std::int64_t, std::uint64_t>> rows;
+  const auto read = [&](const map::ContactKey& wanted) {
+    rows.clear();
+    EXPECT_THAT(
+        file_->ReadContactHistory(
+            wanted, TimeFromUnixMicros(0), TimeFromUnixMicros(100'000'000),
+            [&](const ContactHistoryRow& found) {
+              rows.push_back({ToUnixMicros(found.estimate.time) / 1'000'000,
+                              found.revision});
+              return true;
+            }),
+        IsOk());
+  };
+  read(key);
+  EXPECT_THAT(
+      rows, ElementsAre(std::pair(10, 4), std::pair(15, 4), std::pair(20, 4)));
+  read(other.estimate.key);
+  EXPECT_THAT(rows, ElementsAre(std::pair(30, 3)));
+}
+
 TEST_F(MissionMapTest, SavedCopyIsTheMissionAsItWas) {
   StepTo(60);
   Commit();
