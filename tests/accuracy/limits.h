@@ -11,6 +11,8 @@ namespace fathom::accuracy {
 // "MISSED" with the worst figure and where it stands, and returns how many
 // were missed.
 int CheckLimits(const nlohmann::json& report);
+// The same of the contacts' figures.
+int CheckContactLimits(const nlohmann::json& report);
 
 }  // namespace fathom::accuracy
 

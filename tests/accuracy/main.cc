@@ -1,6 +1,7 @@
-// Prints the accuracy figures of the static map and writes them as JSON.
+// Prints the accuracy figures of the map and writes them as JSON.
 //
-//   accuracy --data DIR [--seeds N] [--only FIGURE] [--check] --out FILE
+//   accuracy --data DIR [--seeds N] [--only FIGURE] [--check] [--draw DIR]
+//            --out FILE
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -9,6 +10,7 @@
 #include <functional>
 #include <map>
 
+#include "tests/accuracy/contacts.h"
 #include "tests/accuracy/figures.h"
 #include "tests/accuracy/limits.h"
 #include "tests/accuracy/thesis_scene.h"
@@ -80,18 +82,21 @@ void Print(const std::string& title, const nlohmann::json& rows) {
 }
 
 int Run(int argc, char** argv) {
-  CLI::App app("Accuracy of the static map against truth it has never seen");
+  CLI::App app("Accuracy of the map against truth it has never seen");
   std::string data;
   std::string out;
   std::string only;
+  std::string draw;
   bool check = false;
   int seeds = 20;
   app.add_option("--data", data, "folder of the test data")->required();
   app.add_option("--out", out, "JSON file to write")->required();
   app.add_option("--seeds", seeds, "surveys per figure")
       ->check(CLI::Range(1, 1000));
-  app.add_option("--only", only, "one figure by its name");
+  app.add_option("--only", only, "the figures whose names begin so");
   app.add_flag("--check", check, "exit 1 if a figure misses its limit");
+  app.add_option("--draw", draw, "folder for the pictures of figs. 6-2 to 6-13")
+      ->check(CLI::ExistingDirectory);
   CLI11_PARSE(app, argc, argv);
 
   const std::vector<Scene> scenes = Scenes(data);
@@ -120,17 +125,25 @@ int Run(int argc, char** argv) {
              return RecordedFigures(
                  data + "/soundings/r2sonic2026_sf_every8th_ping.csv.gz");
            }},
+          {"contact_consistency", ContactConsistencyFigures},
+          {"contact_prediction", ContactPredictionFigures},
+          {"contact_thesis", ThesisContactFigures},
+          {"contact_recorded",
+           [&] { return RecordedContactFigures(data + "/contacts"); }},
       };
   nlohmann::json report = {{"seeds", seeds}};
   for (const auto& [name, make] : figures) {
-    if (!only.empty() && only != name) continue;
+    if (!only.empty() && !name.starts_with(only)) continue;
     report[name] = make();
     Print(name, report[name]);
   }
   std::filesystem::create_directories(
       std::filesystem::absolute(out).parent_path());
   std::ofstream(out) << report.dump(2) << "\n";
-  const int missed = CheckLimits(report);
+  if (!draw.empty()) {
+    std::printf("\n%d pictures in %s\n", DrawThesisContact(draw), draw.c_str());
+  }
+  const int missed = CheckLimits(report) + CheckContactLimits(report);
   return check && missed > 0 ? 1 : 0;
 }
 

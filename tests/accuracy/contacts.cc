@@ -1,0 +1,176 @@
+// Consistency and prediction: ContactConsistencyFigures,
+// ContactPredictionFigures.
+
+#include "tests/accuracy/contacts.h"
+
+#include <Eigen/LU>
+#include <cmath>
+#include <cstdio>
+#include <optional>
+
+#include "tests/accuracy/contact_runs.h"
+
+namespace fathom::accuracy {
+namespace {
+
+// The bounds are those of 100 runs; ten times as many are made, so that the
+// figures are the filter's and not the seeds'.
+constexpr int kRuns = 100;
+constexpr int kSets = 10;
+
+// chi^2 / 100 at 2.5 and 97.5 %, 4 and 2 degrees of freedom
+// (reference/nrl_reference_octave.txt, "0.95,4,100" and "0.95,2,100").
+constexpr double kNeesLow = 3.4648;
+constexpr double kNeesHigh = 4.5731;
+constexpr double kNisLow = 1.6273;
+constexpr double kNisHigh = 2.4106;
+
+struct Scene {
+  std::string name;
+  Encounter encounter;
+};
+
+std::vector<Scene> Scenes() {
+  const map::ContactClassParameters& vessel =
+      map::DefaultContactClasses()[static_cast<std::size_t>(
+          map::ContactClass::kVessel)];
+  std::vector<Scene> scenes;
+  for (const double range_m : {1000.0, 10'000.0}) {
+    for (const double bearing_deg : {0.5, 2.5}) {
+      for (const int noise : {1, 2, 4}) {
+        Scene scene;
+        char name[64];
+        std::snprintf(name, sizeof name, "%g_km_%gx_%g_deg", range_m / 1000,
+                      1.0 * noise, bearing_deg * noise);
+        scene.name = name;
+        scene.encounter = {.contact = {0.8 * range_m, 0.6 * range_m, 0, 0},
+                           .velocity_std_m_s = vessel.first_velocity_std_m_s,
+                           .process_noise_m2_s3 = vessel.process_noise_m2_s3,
+                           .vehicle_m_s = {1.5, -1.0},
+                           .range_std_m = 10.0 * noise,
+                           .bearing_std_deg = bearing_deg * noise};
+        scenes.push_back(scene);
+      }
+    }
+  }
+  return scenes;
+}
+
+// What the runs of one filter come to.
+struct Consistency {
+  double nees = 0;
+  double nis = 0;
+  // Share of instants and sets whose mean over 100 runs is in the bounds: 0.95
+  // of a filter that is exactly right.
+  double nees_inside = 0;
+  double nis_inside = 0;
+  double rmse_m = 0;  // Of the position, second half of the run.
+  int gated = 0;
+};
+
+Consistency Measure(const Encounter& encounter, map::FilterKind filter) {
+  const auto reports = static_cast<std::size_t>(encounter.reports);
+  const auto count = static_cast<double>(reports);
+  double square_m2 = 0;
+  Consistency result;
+  for (int set = 0; set < kSets; ++set) {
+    std::vector<double> nees(reports);
+    std::vector<double> nis(reports);
+    for (int run = 1; run <= kRuns; ++run) {
+      map::ContactMap map(map::ContactMapOptions{.filter = filter});
+      const std::vector<Moment> moments =
+          Run(encounter, static_cast<std::uint64_t>(set * kRuns + run));
+      for (std::size_t i = 0; i < reports; ++i) {
+        const map::ContactOutcome outcome = map.Apply(moments[i].report);
+        result.gated += outcome.applied ? 0 : 1;
+        nis[i] += outcome.nis.value_or(0) / kRuns;
+        const map::ContactEstimate estimate =
+            *map.View().At(moments[i].report.key, moments[i].report.time);
+        const Eigen::Vector4d error = ErrorOf(estimate, moments[i].truth);
+        nees[i] += error.dot(estimate.P.inverse() * error) / kRuns;
+        if (2 * i >= reports) square_m2 += error.head<2>().squaredNorm();
+      }
+    }
+    for (std::size_t i = 0; i < reports; ++i) {
+      result.nees += nees[i] / count / kSets;
+      if (nees[i] > kNeesLow && nees[i] < kNeesHigh) {
+        result.nees_inside += 1 / count / kSets;
+      }
+      if (i == 0) continue;  // Nothing was foretold.
+      result.nis += nis[i] / (count - 1) / kSets;
+      if (nis[i] > kNisLow && nis[i] < kNisHigh) {
+        result.nis_inside += 1 / (count - 1) / kSets;
+      }
+    }
+  }
+  result.rmse_m = std::sqrt(square_m2 / kSets / kRuns / std::floor(count / 2));
+  return result;
+}
+
+}  // namespace
+
+nlohmann::json ContactConsistencyFigures() {
+  auto rows = nlohmann::json::array();
+  for (const Scene& scene : Scenes()) {
+    const Consistency ours =
+        Measure(scene.encounter, map::FilterKind::kFourState);
+    const Consistency theirs =
+        Measure(scene.encounter, map::FilterKind::kPerAxis);
+    rows.push_back(
+        {{"scene", scene.name},
+         {"nees", ours.nees},
+         {"nees_inside_percent", 100 * ours.nees_inside},
+         {"nis", ours.nis},
+         {"nis_inside_percent", 100 * ours.nis_inside},
+         {"gated", ours.gated},
+         {"rmse_m", ours.rmse_m},
+         {"per_axis_rmse_m", theirs.rmse_m},
+         {"per_axis_nees", theirs.nees},
+         {"per_axis_gated", theirs.gated},
+         {"rmse_ratio", ours.rmse_m / theirs.rmse_m},
+         {"bearing_std_deg", scene.encounter.bearing_std_deg}});
+  }
+  return rows;
+}
+
+nlohmann::json ContactPredictionFigures() {
+  auto rows = nlohmann::json::array();
+  const std::vector<Scene> scenes = Scenes();
+  for (const int minutes : {0, 1, 5, 10}) {
+    // The ellipse of share p holds d^2 <= -2 ln(1 - p).
+    constexpr double kShares[3] = {0.5, 0.9, 0.99};
+    double inside[3] = {};
+    double count = 0;
+    for (const Scene& scene : scenes) {
+      for (std::uint64_t run = 1; run <= 3 * kRuns; ++run) {
+        map::ContactMap map(map::ContactMapOptions{});
+        const std::vector<Moment> moments = Run(scene.encounter, 1000 + run);
+        for (std::size_t i = 0; i < moments.size(); ++i) {
+          map.Apply(moments[i].report);
+          if (i % 30 != 29) continue;  // After 5 and 10 minutes.
+          const double ahead_s = 60.0 * minutes;
+          const map::ContactEstimate foretold = *map.View().At(
+              moments[i].report.key, AtS(moments[i].at_s + ahead_s));
+          const Eigen::Vector2d error =
+              ErrorOf(foretold, Ahead(scene.encounter, moments[i].truth,
+                                      ahead_s, 7 * run + i))
+                  .head<2>();
+          const Eigen::Matrix2d P = foretold.P.topLeftCorner<2, 2>();
+          const double square = error.dot(P.inverse() * error);
+          for (int k = 0; k < 3; ++k) {
+            inside[k] += square <= -2 * std::log(1 - kShares[k]) ? 1 : 0;
+          }
+          count += 1;
+        }
+      }
+    }
+    rows.push_back({{"minutes", minutes},
+                    {"predictions", count},
+                    {"within_50_percent", 100 * inside[0] / count},
+                    {"within_90_percent", 100 * inside[1] / count},
+                    {"within_99_percent", 100 * inside[2] / count}});
+  }
+  return rows;
+}
+
+}  // namespace fathom::accuracy
