@@ -116,19 +116,18 @@ nlohmann::json ContactConsistencyFigures() {
         Measure(scene.encounter, map::FilterKind::kFourState);
     const Consistency theirs =
         Measure(scene.encounter, map::FilterKind::kPerAxis);
-    rows.push_back(
-        {{"scene", scene.name},
-         {"nees", ours.nees},
-         {"nees_inside_percent", 100 * ours.nees_inside},
-         {"nis", ours.nis},
-         {"nis_inside_percent", 100 * ours.nis_inside},
-         {"gated", ours.gated},
-         {"rmse_m", ours.rmse_m},
-         {"per_axis_rmse_m", theirs.rmse_m},
-         {"per_axis_nees", theirs.nees},
-         {"per_axis_gated", theirs.gated},
-         {"rmse_ratio", ours.rmse_m / theirs.rmse_m},
-         {"bearing_std_deg", scene.encounter.bearing_std_deg}});
+    rows.push_back({{"scene", scene.name},
+                    {"nees", ours.nees},
+                    {"nees_inside_percent", 100 * ours.nees_inside},
+                    {"nis", ours.nis},
+                    {"nis_inside_percent", 100 * ours.nis_inside},
+                    {"gated", ours.gated},
+                    {"rmse_m", ours.rmse_m},
+                    {"per_axis_rmse_m", theirs.rmse_m},
+                    {"per_axis_nees", theirs.nees},
+                    {"per_axis_gated", theirs.gated},
+                    {"rmse_ratio", ours.rmse_m / theirs.rmse_m},
+                    {"bearing_std_deg", scene.encounter.bearing_std_deg}});
   }
   return rows;
 }
@@ -142,7 +141,7 @@ nlohmann::json ContactPredictionFigures() {
     double inside[3] = {};
     double count = 0;
     for (const Scene& scene : scenes) {
-      for (std::uint64_t run = 1; run <= 3 * kRuns; ++run) {
+      for (std::uint64_t run = 1; run <= kSets * kRuns; ++run) {
         map::ContactMap map(map::ContactMapOptions{});
         const std::vector<Moment> moments = Run(scene.encounter, 1000 + run);
         for (std::size_t i = 0; i < moments.size(); ++i) {

@@ -204,7 +204,7 @@ std::optional<map::ContactReport> ParseAis(const std::string& line) {
   const double course = course_deg * std::numbers::pi / 180;
   map::ContactReport report;
   report.key = {{"ais"}, {mmsi}};
-  report.contact_class = map::ContactClass::kVessel;
+  report.contact_class = map::ContactClass::kUnknown;
   report.time = TimeOf(1'452'556'800.0 + 3600 * h + 60 * m + s);
   report.observation = map::ContactFix{
       .position = {.latitude_deg = latitude_deg,
