@@ -115,6 +115,7 @@ int DrawThesisContact(const std::string& folder) {
   std::vector<double> x;
   // By name: a value at each report.
   std::map<std::string, std::vector<double>> line;
+  double true_deg = 90;
   for (const Moment& moment : moments) {
     map.Apply(moment.report);
     const map::ContactEstimate estimate =
@@ -123,13 +124,15 @@ int DrawThesisContact(const std::string& folder) {
     const auto& heard = std::get<map::RangeBearing>(moment.report.observation);
     const auto [range_m, bearing_deg] = RangeBearingOf(estimate, moment);
     x.push_back(moment.at_s / 60);
+    // Without the leap at 180 degrees.
+    true_deg += std::remainder(moment.azimuth_deg - true_deg, 360);
     const auto about = [&](double deg) {
-      return moment.azimuth_deg + std::remainder(deg - moment.azimuth_deg, 360);
+      return true_deg + std::remainder(deg - true_deg, 360);
     };
     line["range true"].push_back(moment.range_m);
     line["range measured"].push_back(heard.range_m);
     line["range estimated"].push_back(range_m);
-    line["bearing true"].push_back(moment.azimuth_deg);
+    line["bearing true"].push_back(true_deg);
     line["bearing measured"].push_back(about(heard.bearing_deg));
     line["bearing estimated"].push_back(about(bearing_deg));
     const double azimuth = heard.bearing_deg * kRadPerDeg;
