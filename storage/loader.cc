@@ -99,8 +99,32 @@ absl::StatusOr<std::optional<std::int64_t>> NextTileKey(Connection& connection,
   return select.ColumnInt(0);
 }
 
+// The tiles behind a page that cannot be read, from the last one backwards as
+// far as they can be. Behind `last`, in the order of their keys.
+absl::Status ReadFromTheEnd(Connection& connection, std::int64_t last,
+                            std::vector<TileRow>& rows) {
+  FATHOM_ASSIGN_OR_RETURN(
+      Statement select,
+      connection.Prepare("SELECT tile_key, content FROM tile WHERE tile_key > "
+                         "? ORDER BY tile_key DESC"));
+  select.BindInt(0, last);
+  const std::size_t before = rows.size();
+  while (true) {
+    const absl::StatusOr<bool> more = select.Step();
+    if (!more.ok() && !absl::IsDataLoss(more.status())) return more.status();
+    if (!more.ok() || !*more) break;
+    const ByteSpan blob = select.ColumnBlob(1);
+    rows.push_back({.key = map::TileKey::FromPacked(select.ColumnUint(0)),
+                    .blob = Bytes(blob.begin(), blob.end())});
+  }
+  std::reverse(rows.begin() + static_cast<std::ptrdiff_t>(before), rows.end());
+  return absl::OkStatus();
+}
+
 // Reads on behind `last` until the end or `kTileChunkBytes`; false at the end.
-// A tile that cannot be read is put into quarantine and stepped over.
+// A tile that cannot be read is put into quarantine and stepped over; of those
+// in a page that cannot be read not even the keys are known: MendTree finds
+// what is missing.
 absl::StatusOr<bool> ReadTileRows(Connection& connection, std::int64_t& last,
                                   std::vector<TileRow>& rows,
                                   TileHarvest& harvest) {
@@ -114,15 +138,20 @@ absl::StatusOr<bool> ReadTileRows(Connection& connection, std::int64_t& last,
     const absl::StatusOr<bool> more = select.Step();
     if (!more.ok()) {
       if (!absl::IsDataLoss(more.status())) return more.status();
-      FATHOM_ASSIGN_OR_RETURN(const std::optional<std::int64_t> key,
-                              NextTileKey(connection, last));
-      if (!key.has_value()) return more.status();
+      const auto key = NextTileKey(connection, last);
+      if (!key.ok() || !key->has_value()) {
+        harvest.damage.push_back(
+            absl::StrFormat("tiles behind tile_key=%d cannot be read: %s", last,
+                            more.status().message()));
+        FATHOM_RETURN_IF_ERROR(ReadFromTheEnd(connection, last, rows));
+        return false;
+      }
       const auto tile =
-          map::TileKey::FromPacked(static_cast<std::uint64_t>(*key));
+          map::TileKey::FromPacked(static_cast<std::uint64_t>(**key));
       FATHOM_RETURN_IF_ERROR(harvest.Quarantine(
           tile, absl::DataLossError(absl::StrFormat("%s: %s", TileName(tile),
                                                     more.status().message()))));
-      last = *key;
+      last = **key;
       return true;
     }
     if (!*more) return false;

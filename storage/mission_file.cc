@@ -18,6 +18,7 @@
 #include "storage/file_lock.h"
 #include "storage/journal_codec.h"
 #include "storage/loader.h"
+#include "storage/migrate.h"
 #include "storage/schema.h"
 #include "storage/sqlite.h"
 
@@ -161,6 +162,7 @@ absl::Status MissionFile::Impl::OpenWriter() {
   // A copy made by other tools may have left the log's mode behind.
   FATHOM_RETURN_IF_ERROR(
       writer_.QueryText("PRAGMA journal_mode = WAL").status());
+  FATHOM_RETURN_IF_ERROR(Migrate(path_, writer_));
   FATHOM_ASSIGN_OR_RETURN(metadata_, ReadMetadata(writer_));
   FATHOM_ASSIGN_OR_RETURN(const std::vector<SourcePosition> positions,
                           LoadSourcePositions(writer_));

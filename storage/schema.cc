@@ -10,6 +10,7 @@
 
 #include "absl/strings/str_format.h"
 #include "base/status_macros.h"
+#include "storage/checked_pages.h"
 #include "storage/mission_file.h"
 
 namespace fathom::storage {
@@ -112,6 +113,7 @@ constexpr char kMissionColumns[] =
 // Offsets in the header of an SQLite file (sqlite.org/fileformat2.html 1.3);
 // both numbers are big-endian.
 constexpr std::size_t kHeaderBytes = 100;
+constexpr std::size_t kReservedBytesOffset = 20;
 constexpr std::size_t kUserVersionOffset = 60;
 constexpr std::size_t kApplicationIdOffset = 68;
 constexpr char kMagic[] = "SQLite format 3";  // And a zero byte: 16.
@@ -181,8 +183,16 @@ absl::Status CheckHeader(const std::string& path) {
         "%s is not a Fathom mission (no SQLite header); it was left untouched",
         path));
   }
-  return CheckNumbers(BigEndian32(header.data() + kApplicationIdOffset),
-                      BigEndian32(header.data() + kUserVersionOffset), path);
+  const std::int64_t version = BigEndian32(header.data() + kUserVersionOffset);
+  FATHOM_RETURN_IF_ERROR(CheckNumbers(
+      BigEndian32(header.data() + kApplicationIdOffset), version, path));
+  // Else a flipped bit here would switch all checksums off.
+  if (version >= kFirstCheckedVersion &&
+      header[kReservedBytesOffset] != kPageChecksumBytes) {
+    return absl::DataLossError(absl::StrFormat(
+        "%s: its header says that it has no checksums of pages", path));
+  }
+  return absl::OkStatus();
 }
 
 absl::Status CheckVersion(Connection& connection) {
@@ -224,6 +234,7 @@ absl::Status CreateSchema(Connection& connection,
   // docs/storage_format.md for what was measured.
   FATHOM_RETURN_IF_ERROR(connection.Execute("PRAGMA page_size = 8192"));
   FATHOM_RETURN_IF_ERROR(connection.Execute("PRAGMA auto_vacuum = NONE"));
+  FATHOM_RETURN_IF_ERROR(connection.CheckPages());
   FATHOM_RETURN_IF_ERROR(connection.Execute("PRAGMA synchronous = FULL"));
   FATHOM_ASSIGN_OR_RETURN(Transaction transaction,
                           Transaction::Begin(connection));

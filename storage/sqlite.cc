@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_format.h"
 #include "base/status_macros.h"
+#include "storage/checked_pages.h"
 
 namespace fathom::storage {
 namespace {
@@ -19,6 +20,7 @@ absl::StatusCode CodeOf(int result, int system_errno) {
     case SQLITE_TOOBIG:
       return absl::StatusCode::kResourceExhausted;
     case SQLITE_IOERR:
+      if (result == SQLITE_IOERR_DATA) return absl::StatusCode::kDataLoss;
       // The shared-memory index too is a file that must grow.
       if (system_errno == ENOSPC || system_errno == EDQUOT ||
           result == SQLITE_IOERR_NOMEM) {
@@ -47,8 +49,9 @@ absl::StatusCode CodeOf(int result, int system_errno) {
 absl::Status ErrorOf(sqlite3* database, int result, std::string_view doing) {
   const int system_errno =
       database == nullptr ? 0 : sqlite3_system_errno(database);
-  const char* text =
-      database == nullptr ? sqlite3_errstr(result) : sqlite3_errmsg(database);
+  const char* text = result == SQLITE_IOERR_DATA ? "a page fails its checksum"
+                     : database == nullptr       ? sqlite3_errstr(result)
+                                                 : sqlite3_errmsg(database);
   std::string message =
       absl::StrFormat("%s: %s (sqlite code %d)", doing, text, result);
   if (system_errno != 0) {
@@ -176,7 +179,8 @@ absl::StatusOr<Connection> Connection::Open(const std::string& path,
       break;
   }
   sqlite3* database = nullptr;
-  const int result = sqlite3_open_v2(path.c_str(), &database, flags, nullptr);
+  const int result =
+      sqlite3_open_v2(path.c_str(), &database, flags, CheckedPagesVfs());
   Connection connection;
   connection.database_.reset(database);
   if (result != SQLITE_OK) {
@@ -196,6 +200,17 @@ absl::StatusOr<Connection> Connection::Open(const std::string& path,
       },
       connection.log_frames_.get());
   return connection;
+}
+
+absl::Status Connection::CheckPages() {
+  int reserved = kPageChecksumBytes;
+  int result = sqlite3_file_control(database_.get(), "main",
+                                    SQLITE_FCNTL_RESERVE_BYTES, &reserved);
+  if (result == SQLITE_OK) {
+    result = sqlite3_file_control(database_.get(), "main",
+                                  kFileControlCheckPages, nullptr);
+  }
+  return result == SQLITE_OK ? absl::OkStatus() : Error(result, "check pages");
 }
 
 absl::Status Connection::Execute(const std::string& sql) {
@@ -266,6 +281,12 @@ void Connection::CheckpointOnClose() {
 
 absl::Status Connection::BackupTo(const std::string& path) {
   FATHOM_ASSIGN_OR_RETURN(Connection copy, Open(path, Mode::kCreate));
+  // Pages may reach the copy before the header that says so.
+  FATHOM_ASSIGN_OR_RETURN(const std::int64_t version,
+                          QueryInt("PRAGMA user_version"));
+  if (version >= kFirstCheckedVersion) {
+    FATHOM_RETURN_IF_ERROR(copy.CheckPages());
+  }
   sqlite3_backup* backup = sqlite3_backup_init(copy.database_.get(), "main",
                                                database_.get(), "main");
   if (backup == nullptr) {

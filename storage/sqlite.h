@@ -6,7 +6,8 @@
 //   INTERNAL             an I/O error, fsync's among them: what was written
 //                        last may or may not be on the disk; stop
 //                        acknowledging and let the supervisor restart us
-//   DATA_LOSS            the file is corrupt, or no database
+//   DATA_LOSS            the file is corrupt (a page fails its checksum), or no
+//                        database
 //   UNAVAILABLE          another connection holds a lock
 //   FAILED_PRECONDITION  not permitted: read-only, cannot open, constraint
 //   INVALID_ARGUMENT     our SQL or its use is wrong
@@ -90,10 +91,15 @@ class Connection {
 
   Connection() = default;
 
-  // Opens `path`; nothing is read yet. SQLite never checkpoints by itself:
+  // Opens `path`; nothing is read yet. Pages are checked where the file says so
+  // (checked_pages.h). SQLite never checkpoints by itself:
   // neither by the log's size nor when the connection closes (but see
   // CheckpointOnClose).
   static absl::StatusOr<Connection> Open(const std::string& path, Mode mode);
+
+  // Makes every page of the database a checked one (checked_pages.h): of a new
+  // one at once, of another with its next VACUUM.
+  absl::Status CheckPages();
 
   // Runs SQL (one or more statements) without parameters or results.
   absl::Status Execute(const std::string& sql);
