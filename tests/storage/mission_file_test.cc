@@ -14,7 +14,6 @@
 
 #include "absl/strings/str_format.h"
 #include "base/status_macros.h"
-#include "storage/checked_pages.h"
 #include "storage/restore.h"
 #include "storage/sqlite.h"
 #include "tests/storage/event_script.h"
@@ -528,28 +527,6 @@ TEST_F(MissionMapTest, OneDamagedTileAndTheRestServes) {
   const auto left = restored.map->View()->global().known_leaf_count();
   EXPECT_GT(left, 0u);
   EXPECT_LT(left, known);
-}
-
-// tests/golden/make made it with the last program of version 5, and told its
-// digest.
-TEST(MissionFile, MissionOfVersion5IsBackedUpAndBroughtToThisOne) {
-  const TempDir dir;
-  const std::string path = dir.File("m");
-  const std::string golden =
-      FATHOM_SOURCE_DIR "/tests/golden/mission-v5.fathom";
-  std::filesystem::copy_file(golden, path);
-  for (int time = 0; time < 2; ++time) {
-    FATHOM_ASSERT_OK_AND_ASSIGN(const FilePtr file, MissionFile::Open(path));
-    FATHOM_ASSERT_OK_AND_ASSIGN(const RestoredMap restored, OpenMap(*file));
-    EXPECT_EQ(restored.map->View()->Digest(), "d0003ab6f73f787e");
-    FATHOM_ASSERT_OK_AND_ASSIGN(const Proof proof, file->Verify());
-    EXPECT_THAT(proof.problems, IsEmpty());
-    EXPECT_EQ(proof.history_rows, 21u);
-    ASSERT_THAT(file->Close(), IsOk());
-  }
-  EXPECT_EQ(ReadAll(path)[63], kSchemaVersion);
-  EXPECT_EQ(ReadAll(path)[20], kPageChecksumBytes);
-  EXPECT_EQ(ReadAll(path + ".v5.bak")[63], 5);
 }
 
 TEST_F(MissionMapTest, SoundMissionIsProvedWhileItIsWritten) {
