@@ -1,6 +1,7 @@
 #include "map/global/global_map_view.h"
 
 #include <algorithm>
+#include <bit>
 #include <vector>
 
 namespace fathom::map {
@@ -22,6 +23,37 @@ void VisitTiles(const Tile& tile,
                 const std::function<void(const Tile&)>& visit) {
   visit(tile);
   for (const auto& child : tile.children()) VisitTiles(*child, visit);
+}
+
+using LeafVisitor = absl::FunctionRef<void(const CellKey&, const Leaf&)>;
+
+// The leaves of the cell that the box touches.
+void VisitLeavesIn(const Tile& root, const CellKey& cell, const LatticeBox& box,
+                   LeafVisitor visit) {
+  const int up = kMaxLevel - cell.level;
+  const std::uint32_t row = cell.row << up;
+  const std::uint32_t col = cell.col << up;
+  const std::uint32_t last = (1u << up) - 1;
+  if (row > box.row_last || row + last < box.row_first || col > box.col_last ||
+      col + last < box.col_first) {
+    return;
+  }
+  const Tile::Found found = Tile::Descend(root, row, col);
+  if (found.level <= cell.level) {
+    const int down = cell.level - found.level;
+    visit({.level = static_cast<std::uint8_t>(found.level),
+           .row = cell.row >> down,
+           .col = cell.col >> down},
+          found.leaf);
+    return;
+  }
+  for (std::uint32_t quarter = 0; quarter < 4; ++quarter) {
+    VisitLeavesIn(root,
+                  {.level = static_cast<std::uint8_t>(cell.level + 1),
+                   .row = cell.row * 2 + quarter / 2,
+                   .col = cell.col * 2 + quarter % 2},
+                  box, visit);
+  }
 }
 
 using TileVisitor = std::function<void(const TileKey&, const Tile*)>;
@@ -58,25 +90,34 @@ void VisitDifferent(const Tile* old, const Tile& now,
 
 }  // namespace
 
+// Field by field into its place, see Tile::Descend.
+inline void GlobalMapView::Tell(const Leaf& leaf, int level,
+                                DepthEstimate& estimate) const {
+  estimate = {};
+  estimate.depth_m = leaf.depth_m;
+  estimate.std_m = leaf.std_m();
+  estimate.kind = ToEvidenceKind(leaf.kind());
+  estimate.time_s = leaf.time_s;
+  if (leaf.spread_code != 0) estimate.variability_m = leaf.variability_m();
+  if (leaf.hazard_m < leaf.depth_m) estimate.hazard_m = leaf.hazard_m;
+  estimate.cell_size_m = static_cast<float>(root_.cell_size_m(level));
+}
+
 bool GlobalMapView::Read(const GeodeticPoint& point,
                          DepthEstimate& estimate) const {
   const std::optional<LatticePoint> place = root_.LocateLattice(point);
   if (!place || root_tile_ == nullptr) return false;
   const Tile::Found found = Tile::Descend(*root_tile_, place->row, place->col);
   if (!found.leaf.known()) return false;
-  estimate = {};
-  estimate.depth_m = found.leaf.depth_m;
-  estimate.std_m = found.leaf.std_m();
-  estimate.kind = ToEvidenceKind(found.leaf.kind());
-  estimate.time_s = found.leaf.time_s;
-  if (found.leaf.spread_code != 0) {
-    estimate.variability_m = found.leaf.variability_m();
-  }
-  if (found.leaf.hazard_m < found.leaf.depth_m) {
-    estimate.hazard_m = found.leaf.hazard_m;
-  }
-  estimate.cell_size_m = static_cast<float>(root_.cell_size_m(found.level));
+  Tell(found.leaf, found.level, estimate);
   return true;
+}
+
+DepthEstimate GlobalMapView::EstimateOf(const CellKey& cell,
+                                        const Leaf& leaf) const {
+  DepthEstimate estimate;
+  Tell(leaf, cell.level, estimate);
+  return estimate;
 }
 
 std::optional<DepthEstimate> GlobalMapView::At(
@@ -96,6 +137,20 @@ std::optional<std::pair<CellKey, Leaf>> GlobalMapView::LeafAt(
                            .row = place->row >> up,
                            .col = place->col >> up},
                    found.leaf};
+}
+
+void GlobalMapView::ForEachLeafIn(const LatticeBox& box,
+                                  LeafVisitor visit) const {
+  if (root_tile_ == nullptr) return;
+  // From the least cell that holds the box.
+  const std::uint32_t differ =
+      (box.row_first ^ box.row_last) | (box.col_first ^ box.col_last);
+  const int up = static_cast<int>(std::bit_width(differ));
+  VisitLeavesIn(*root_tile_,
+                {.level = static_cast<std::uint8_t>(kMaxLevel - up),
+                 .row = box.row_first >> up,
+                 .col = box.col_first >> up},
+                box, visit);
 }
 
 std::optional<DepthBounds> GlobalMapView::Bounds(const CellKey& cell) const {

@@ -15,6 +15,7 @@
 #include <optional>
 #include <utility>
 
+#include "absl/functional/function_ref.h"
 #include "map/geodesy/depth_estimate.h"
 #include "map/geodesy/points.h"
 #include "map/global/cell_key.h"
@@ -57,6 +58,15 @@ class GlobalMapView {
   std::optional<std::pair<CellKey, Leaf>> LeafAt(
       const GeodeticPoint& point) const;
 
+  // What a leaf says, as At tells it. REQUIRES: leaf.known().
+  DepthEstimate EstimateOf(const CellKey& cell, const Leaf& leaf) const;
+
+  // Calls visit(cell, leaf) once for every leaf, unknown ones too, that shares
+  // a place with the box, in Z-order. About 25 ns a leaf.
+  void ForEachLeafIn(
+      const LatticeBox& box,
+      absl::FunctionRef<void(const CellKey&, const Leaf&)> visit) const;
+
   // Answers "could anything in this cell be shallower than z?" without opening
   // it. nullopt: nothing is known in the cell. Where the map is coarser than
   // the cell, the leaf's own bounds. O(1) for a tile's root cell, else at most
@@ -91,6 +101,8 @@ class GlobalMapView {
   }
 
  private:
+  void Tell(const Leaf& leaf, int level, DepthEstimate& estimate) const;
+
   RootSquare root_;
   std::shared_ptr<const Tile> root_tile_;
   float tolerance_m_ = 0;

@@ -101,6 +101,19 @@ double StaticProbability(const DepthEstimate& estimate, double solid_above_m,
   return TabulatedNormalCdf(above_m / aged_std_m);
 }
 
+double ContactProbability(const ContactPoint& predicted,
+                          const Eigen::Vector2d& offset_m,
+                          const ObstacleQuery& query,
+                          double position_variance_m2) {
+  const double overlap = DepthOverlap(predicted, query);
+  if (overlap == 0.0) return 0.0;
+  const Eigen::Matrix2d covariance_m2 =
+      predicted.P.topLeftCorner<2, 2>() +
+      position_variance_m2 * Eigen::Matrix2d::Identity();
+  return overlap * DiscProbability(offset_m, covariance_m2,
+                                   predicted.radius_m + query.radius_m);
+}
+
 ObstacleState ClassifyProbability(double probability, double confidence,
                                   bool seabed_known) {
   if (probability >= confidence) return ObstacleState::kOccupied;
@@ -109,52 +122,59 @@ ObstacleState ClassifyProbability(double probability, double confidence,
   return ObstacleState::kUncertain;
 }
 
+void AddContact(const ObstacleQuery& query, const Contact& contact,
+                const ContactPoint& predicted, const Eigen::Vector2d& offset_m,
+                double position_variance_m2, ObstacleAnswer& answer) {
+  const double probability =
+      ContactProbability(predicted, offset_m, query, position_variance_m2);
+  if (probability == 0.0) return;
+  // 1 - (1 - P)(1 - p), without losing small ones to rounding.
+  answer.probability += (1.0 - answer.probability) * probability;
+  if (probability < kLeastToldProbability) return;
+  Tell({.key = contact.key(),
+        .probability = probability,
+        .distance_m = offset_m.norm(),
+        .age_s = std::max(0.0, ToSeconds(query.time - predicted.report_time))},
+       answer.contacts);
+}
+
+void Conclude(const ObstacleQuery& query, ObstacleAnswer& answer) {
+  answer.state = ClassifyProbability(answer.probability, query.confidence,
+                                     answer.seabed.has_value());
+  // False for a hazard that is NaN: none.
+  const bool at_hazard =
+      answer.seabed.has_value() &&
+      query.depth_m + query.vertical_clearance_m >=
+          static_cast<double>(answer.seabed->estimate.hazard_m);
+  if (at_hazard && answer.state == ObstacleState::kFree) {
+    answer.state = ObstacleState::kUncertain;
+  }
+}
+
 ObstacleAnswer Answer(const ObstacleQuery& query,
                       const std::optional<SeabedEstimate>& seabed,
                       const ContactsView& contacts, const QueryModel& model) {
   ObstacleAnswer answer;
-  const bool known = seabed.has_value() && IsKnown(seabed->estimate);
-  // False for a hazard that is NaN: none.
-  const bool at_hazard =
-      known && query.depth_m + query.vertical_clearance_m >=
-                   static_cast<double>(seabed->estimate.hazard_m);
-  if (known) {
+  if (seabed.has_value() && IsKnown(seabed->estimate)) {
+    const double solid_above_m = query.depth_m + query.vertical_clearance_m;
     SeabedReason& reason = answer.seabed.emplace();
     reason.estimate = seabed->estimate;
     reason.local = seabed->local;
     reason.activity = seabed->activity;
     reason.age_s = AgeS(seabed->estimate, query.time);
-    reason.probability = StaticProbability(
-        seabed->estimate, query.depth_m + query.vertical_clearance_m,
-        reason.age_s.value_or(0.0), model);
-    if (at_hazard) {
+    reason.probability = StaticProbability(seabed->estimate, solid_above_m,
+                                           reason.age_s.value_or(0.0), model);
+    if (solid_above_m >= static_cast<double>(seabed->estimate.hazard_m)) {
       reason.probability = std::max(reason.probability, kHazardShare);
     }
     answer.probability = reason.probability;
   }
-  contacts.ForEachNear(
-      query.position, query.radius_m, query.time, [&](const NearContact& near) {
-        const double overlap = DepthOverlap(near.predicted, query);
-        if (overlap == 0.0) return;
-        const double probability =
-            overlap * DiscProbability({near.north_m, near.east_m},
-                                      near.predicted.P.topLeftCorner<2, 2>(),
-                                      near.predicted.radius_m + query.radius_m);
-        // 1 - (1 - P)(1 - p), without losing small ones to rounding.
-        answer.probability += (1.0 - answer.probability) * probability;
-        if (probability < kLeastToldProbability) return;
-        Tell({.key = near.contact->key(),
-              .probability = probability,
-              .distance_m = std::hypot(near.north_m, near.east_m),
-              .age_s = std::max(
-                  0.0, ToSeconds(query.time - near.predicted.report_time))},
-             answer.contacts);
-      });
-  answer.state =
-      ClassifyProbability(answer.probability, query.confidence, known);
-  if (at_hazard && answer.state == ObstacleState::kFree) {
-    answer.state = ObstacleState::kUncertain;
-  }
+  contacts.ForEachNear(query.position, query.radius_m, query.time,
+                       [&](const NearContact& near) {
+                         AddContact(query, *near.contact, near.predicted,
+                                    {near.north_m, near.east_m}, 0.0, answer);
+                       });
+  Conclude(query, answer);
   return answer;
 }
 

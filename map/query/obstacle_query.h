@@ -26,6 +26,7 @@
 #ifndef FATHOM_MAP_QUERY_OBSTACLE_QUERY_H_
 #define FATHOM_MAP_QUERY_OBSTACLE_QUERY_H_
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -135,6 +136,25 @@ absl::Status ValidateQuery(const ObstacleQuery& query);
 // <= solid_above_m.
 double StaticProbability(const DepthEstimate& estimate, double solid_above_m,
                          double age_s, const QueryModel& model);
+
+// P_contact: that a contact, predicted to the query's time, is within its
+// radius
+// + query.radius_m of the place, from which its predicted position lies
+// `offset_m` (north, east in the contact's plane), and their depths meet.
+// `position_variance_m2` of the one who asks is added on each axis. About 1 us.
+double ContactProbability(const ContactPoint& predicted,
+                          const Eigen::Vector2d& offset_m,
+                          const ObstacleQuery& query,
+                          double position_variance_m2 = 0);
+
+// Joins one contact to an answer: P and, if it is worth telling, its reason.
+// Arguments as ContactProbability's. Conclude() must follow the last.
+void AddContact(const ObstacleQuery& query, const Contact& contact,
+                const ContactPoint& predicted, const Eigen::Vector2d& offset_m,
+                double position_variance_m2, ObstacleAnswer& answer);
+
+// The state of an answer whose P is complete, by the rule of the file comment.
+void Conclude(const ObstacleQuery& query, ObstacleAnswer& answer);
 
 // The state for P at confidence c, by the rule of the file comment.
 ObstacleState ClassifyProbability(double probability, double confidence,

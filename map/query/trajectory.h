@@ -88,8 +88,8 @@ struct ContactApproach {
   Time time;
   // Between the vehicle's planned and the contact's predicted place, metres.
   double distance_m = 0;
-  // Greatest probability, over the path, that the contact is within r_contact +
-  // r of the vehicle and their depths meet.
+  // Of passing within r_contact + r of it, at whatever depth
+  // (map/query/closest_approach.h).
   double probability = 0;
 };
 

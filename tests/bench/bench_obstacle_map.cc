@@ -32,6 +32,7 @@
 
 #include "base/mutex.h"
 #include "map/geodesy/ned_frame.h"
+#include "map/obstacle_map/check_trajectory.h"
 #include "map/obstacle_map/obstacle_map.h"
 #include "tests/map/obstacle_map/test_missions.h"
 
@@ -230,6 +231,47 @@ void BM_Transfer1MCells(benchmark::State& state) {
     state.counters["after_worst_us"] = kBatch * 1e-3 * Percentile(after, 1);
   }
 }
+
+// 1000 waypoints, 10 km, 10 m cells: a chart, and an activity over 5 km of the
+// way with every other cell measured; a vehicle of 2 m, 1 m sure of its place.
+void BM_CheckTrajectory(benchmark::State& state) {
+  MissionOptions options = SmallMission();
+  ObstacleMap map(options);
+  if (!map.Import(FlatChart(30, 4), true).ok()) std::abort();
+  StartActivity survey = Survey("a", EstimatorKind::kAdaptive);
+  survey.options.north_extent_m = 5000;
+  survey.options.east_extent_m = 500;
+  if (!map.Start(survey).ok()) std::abort();
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> unit(0, 1);
+  for (int i = 0; i < 12'500; ++i) {
+    Ping ping;
+    ping.activity = ActivityId{"a"};
+    ping.time = At(i / 100);
+    ping.pose.position = Place(5000 * unit(random), 500 * unit(random));
+    ping.beams = {
+        Beam{.range_m = 1, .bearing_rad = 0, .depth_m = 28, .std_m = 1}};
+    if (!map.ApplyPing(ping).ok()) std::abort();
+  }
+  Trajectory path;
+  path.radius_m = 2;
+  path.position_std_m = 1;
+  for (int i = 0; i < 1000; ++i) {
+    path.waypoints.push_back(
+        {.position = Place(10.01 * i, 250 + 40 * std::sin(0.02 * i)),
+         .depth_m = 10,
+         .time = At(1000 + 5 * i)});
+  }
+  const ViewPtr view = map.View();
+  std::uint64_t cells = 0;
+  for (auto _ : state) {
+    const auto verdict = CheckTrajectory(*view, path);
+    if (!verdict.ok() || verdict->legs.size() != 999) std::abort();
+    cells = verdict->cells;
+  }
+  state.counters["cells"] = static_cast<double>(cells);
+}
+BENCHMARK(BM_CheckTrajectory)->Unit(benchmark::kMillisecond);
 
 BENCHMARK(BM_Transfer1MCells)
     ->Iterations(1)
