@@ -32,15 +32,6 @@ struct IndexRange {
   // The span lies wholly between 0 and count.
   bool inside;
 };
-// Whether the tangent plane at `origin` means something at `point`: it folds
-// back beyond a quarter of the Earth, where no activity (100 km at most) is.
-bool IsNear(const map::GeodeticPoint& origin, const map::GeodeticPoint& point) {
-  const double north_deg = point.latitude_deg - origin.latitude_deg;
-  double east_deg = std::fabs(point.longitude_deg - origin.longitude_deg);
-  if (east_deg > 180) east_deg = 360 - east_deg;
-  return std::fabs(north_deg) < 10 &&
-         (east_deg < 60 || std::fabs(origin.latitude_deg) > 75);
-}
 
 IndexRange Touched(double low, double high, uint32_t count) {
   const double end = count;
@@ -92,9 +83,7 @@ RegionShoalest::RegionShoalest(const map::ObstacleMapView& view,
   if (options_.activity != nullptr) {
     activities_.push_back(options_.activity);
   } else if (options_.layers != map::LayerChoice::kGlobalOnly) {
-    for (const auto& activity : view.activities()) {
-      if (activity->open()) activities_.push_back(activity.get());
-    }
+    activities_ = view.open_newest_first();
   }
   const map::RootSquare& root = view.global().root();
   level_ = root.LevelFor(options_.resolution_m);
@@ -229,7 +218,7 @@ bool RegionShoalest::NextRow(const std::vector<map::GeodeticPoint>& north,
     for (const auto& corner : south) south_ned_.push_back(frame.ToNed(corner));
     for (size_t column = 0; column < cells; ++column) {
       if (stop.load(std::memory_order_relaxed)) return false;
-      if (!IsNear(frame.origin(), north[column])) continue;
+      if (!frame.Covers(north[column])) continue;
       const LocalPart part =
           InActivity(local, north_ned_, south_ned_, column, stop);
       shoalest_m[column] = std::min(shoalest_m[column], part.shoalest_m);

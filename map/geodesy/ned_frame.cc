@@ -66,6 +66,14 @@ NedPoint NedFrame::ToNed(const GeodeticPoint& point) const {
           .down_m = 0.0};
 }
 
+bool NedFrame::Covers(const GeodeticPoint& point) const {
+  const double north_deg = point.latitude_deg - origin_.latitude_deg;
+  double east_deg = std::fabs(point.longitude_deg - origin_.longitude_deg);
+  if (east_deg > 180) east_deg = 360 - east_deg;
+  return std::fabs(north_deg) < 10 &&
+         (east_deg < 60 || std::fabs(origin_.latitude_deg) > 75);
+}
+
 GeodeticPoint NedFrame::ToGeodetic(double north_m, double east_m) const {
   // The line through (north, east) along the origin's vertical meets the
   // ellipsoid (a^2 + b^2) + c^2 / (1 - e^2) = R^2 at depth d below the plane:

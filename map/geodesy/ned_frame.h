@@ -39,6 +39,11 @@ class NedFrame {
   // folds back and the result means nothing.
   NedPoint ToNed(const GeodeticPoint& point) const;
 
+  // Whether ToNed means something at the point and Contains-like questions may
+  // be put to it: within 10 degrees north or south and 60 east or west (any,
+  // near a pole), where nothing has folded back.
+  bool Covers(const GeodeticPoint& point) const;
+
   // The point of the ellipsoid that ToNed projects to (north_m, east_m): the
   // exact inverse, to 10 nm. REQUIRES: both within 3000 km of 0.
   GeodeticPoint ToGeodetic(double north_m, double east_m) const;

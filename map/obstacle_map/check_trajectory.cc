@@ -42,16 +42,6 @@ PlanePoint ToPlane(const NedPoint& point) {
   return {.north_m = point.north_m, .east_m = point.east_m};
 }
 
-// Whether the plane at `origin` means something at `point`: it folds back
-// beyond a quarter of the Earth, where no activity (100 km at most) is.
-bool IsNear(const GeodeticPoint& origin, const GeodeticPoint& point) {
-  const double north_deg = point.latitude_deg - origin.latitude_deg;
-  double east_deg = std::fabs(point.longitude_deg - origin.longitude_deg);
-  if (east_deg > 180) east_deg = 360 - east_deg;
-  return std::fabs(north_deg) < 10 &&
-         (east_deg < 60 || std::fabs(origin.latitude_deg) > 75);
-}
-
 // Indices of a grid that a span touches; none if first > last.
 struct IndexRange {
   std::int32_t first;
@@ -76,16 +66,13 @@ class Checker {
       : view_(view),
         trajectory_(trajectory),
         check_(check),
+        open_(view.open_newest_first()),
         half_width_m_(SweptHalfWidthM(trajectory)),
         finest_leaf_m_(view.global().root().cell_size_m(
             view.global().root().max_level())) {
     query_.confidence = trajectory.confidence;
     query_.vertical_clearance_m = trajectory.vertical_clearance_m;
     query_.radius_m = trajectory.radius_m;
-    for (auto it = view.activities().rbegin(); it != view.activities().rend();
-         ++it) {
-      if ((*it)->open()) open_.push_back(it->get());
-    }
   }
 
   absl::StatusOr<TrajectoryVerdict> Run() {
@@ -162,7 +149,7 @@ class Checker {
     double covering_cell_m = std::numeric_limits<double>::infinity();
     on_activity_ = false;
     for (const ActivityView* activity : open_) {
-      if (!IsNear(activity->local->frame().origin(), piece.from)) continue;
+      if (!activity->local->frame().Covers(piece.from)) continue;
       if (CheckActivity(*activity, piece)) {
         covering_cell_m =
             std::min(covering_cell_m, activity->options.cell_size_m);
@@ -333,7 +320,7 @@ class Checker {
   double HeldByActivity(const std::array<GeodeticPoint, 4>& corners) const {
     double cell_m = std::numeric_limits<double>::infinity();
     for (const ActivityView* activity : open_) {
-      if (!IsNear(activity->local->frame().origin(), corners[0])) continue;
+      if (!activity->local->frame().Covers(corners[0])) continue;
       const bool holds = std::all_of(corners.begin(), corners.end(),
                                      [activity](const GeodeticPoint& p) {
                                        return activity->local->Contains(p);
@@ -408,9 +395,9 @@ class Checker {
   const ObstacleMapView& view_;
   const Trajectory& trajectory_;
   const TrajectoryCheck& check_;
+  const std::vector<const ActivityView*>& open_;  // The newest first.
   const double half_width_m_;
   const double finest_leaf_m_;
-  std::vector<const ActivityView*> open_;  // The newest first.
   TrajectoryVerdict verdict_;
   std::set<const Contact*> met_;  // Contacts near any leg.
   absl::Status status_;

@@ -85,6 +85,10 @@ class ObstacleMapView {
   const std::vector<std::shared_ptr<const ActivityView>>& activities() const {
     return parts_.activities;
   }
+  // The open ones, the newest first: the order in which points ask them.
+  const std::vector<const ActivityView*>& open_newest_first() const {
+    return open_newest_first_;
+  }
   const ContactsView& contacts() const { return parts_.contacts; }
   double ageing_rate_m2_s() const { return parts_.ageing_rate_m2_s; }
   const MissionCounters& counters() const { return parts_.counters; }
@@ -127,7 +131,6 @@ class ObstacleMapView {
                                            LayerChoice layers) const;
 
   Parts parts_;
-  // Open activities, the newest first: the order in which points ask them.
   std::vector<const ActivityView*> open_newest_first_;
 };
 
