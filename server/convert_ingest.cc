@@ -321,8 +321,22 @@ IngestMessage ToIngest(const v1::ContactReport& report, const FieldPath& path) {
   return message;
 }
 
+IngestMessage NotFromTheFuture(IngestMessage message, Time now,
+                               const FieldPath& path) {
+  const auto* const report = std::get_if<map::ContactReport>(&message.content);
+  if (report != nullptr && report->time - now > kMostAhead) {
+    message.content = Refusal{
+        map::RejectReason::kInvalidMessage, FieldPath(path, "time").ToString(),
+        absl::StrFormat("%.0f h ahead of the server's clock, at most "
+                        "%d; the unit is seconds since 1970 UTC",
+                        ToSeconds(report->time - now) / 3600,
+                        kMostAhead.count())};
+  }
+  return message;
+}
+
 absl::StatusOr<std::vector<IngestMessage>> ConvertReports(
-    const v1::ReportContactsRequest& request) {
+    const v1::ReportContactsRequest& request, Time now) {
   const FieldPath root;
   if (request.reports().empty()) {
     return Missing(FieldPath(root, "reports"), "at least one report");
@@ -337,7 +351,7 @@ absl::StatusOr<std::vector<IngestMessage>> ConvertReports(
     const v1::ContactReport& report = request.reports(static_cast<int>(i));
     const FieldPath path(root, "reports", i);
     FATHOM_RETURN_IF_ERROR(CheckNumbering(report, path));
-    IngestMessage message = ToIngest(report, path);
+    IngestMessage message = NotFromTheFuture(ToIngest(report, path), now, path);
     if (const auto* refusal = std::get_if<Refusal>(&message.content)) {
       return InvalidField(refusal->field, refusal->description,
                           static_cast<v1::RejectReason>(refusal->reason));

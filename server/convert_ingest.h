@@ -43,11 +43,16 @@ absl::StatusOr<map::ContactReport> ConvertReport(
 IngestMessage ToIngest(const v1::Ping& ping, const FieldPath& path);
 IngestMessage ToIngest(const v1::ContactReport& report, const FieldPath& path);
 
+// The message, or a Refusal in its place: a contact report stamped more than
+// kMostAhead after `now`.
+IngestMessage NotFromTheFuture(IngestMessage message, Time now,
+                               const FieldPath& path);
+
 // All reports of a batch, or the error of the first that is malformed.
 // Errors: INVALID_ARGUMENT (path from "reports"), RESOURCE_EXHAUSTED past
 // kMaxReportsPerRequest.
 absl::StatusOr<std::vector<IngestMessage>> ConvertReports(
-    const v1::ReportContactsRequest& request);
+    const v1::ReportContactsRequest& request, Time now);
 
 // What a refused message's Rejection says.
 void WriteRejection(uint64_t sequence, const Refusal& refusal,

@@ -90,7 +90,7 @@ grpc::ServerUnaryReactor* IngestService::ReportContacts(
     grpc::CallbackServerContext* call, const v1::ReportContactsRequest* request,
     v1::ReportContactsResponse* response) {
   grpc::ServerUnaryReactor* reactor = call->DefaultReactor();
-  auto messages = ConvertReports(*request);
+  auto messages = ConvertReports(*request, context_.clock.Now());
   if (!messages.ok()) {
     reactor->Finish(ToGrpc(messages.status()));
     return reactor;

@@ -85,8 +85,9 @@ absl::Status IngestStream<Kind>::TakeRequest() {
     MutexLock lock(mutex_);
     under_way_ += 1;
   }
-  absl::StatusOr<Room> room =
-      context_.keeper.Submit(ToIngest(message, path), this->shared_from_this());
+  absl::StatusOr<Room> room = context_.keeper.Submit(
+      NotFromTheFuture(ToIngest(message, path), context_.clock.Now(), path),
+      this->shared_from_this());
   MutexLock lock(mutex_);
   if (!room.ok()) {
     under_way_ -= 1;

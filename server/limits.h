@@ -31,6 +31,14 @@ inline constexpr size_t kMaxPointsPerQuery = 100'000;
 // Most waypoints in CheckTrajectory: a day's plan at one a ten seconds.
 inline constexpr size_t kMaxWaypoints = 10'000;
 
+// A contact report is refused if it is stamped further ahead of the server's
+// clock. Simulations and clocks that run ahead are the sender's matter;
+// milliseconds taken for seconds would close the contact to all true reports.
+inline constexpr std::chrono::hours kMostAhead{24};
+
+// Share of max_contacts from which GetMissionStatus warns.
+inline constexpr double kContactsWarning = 0.9;
+
 // Most reports in ReportContacts: an AIS receiver hears a few hundred ships a
 // minute; 1000 reports are one group commit.
 inline constexpr size_t kMaxReportsPerRequest = 1000;

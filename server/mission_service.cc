@@ -190,6 +190,13 @@ grpc::ServerUnaryReactor* MissionService::GetMissionStatus(
   contacts->set_max_contacts(metadata.max_contacts);
   WriteRejects(view->counters().contact_rejects, contacts->mutable_rejects());
   WriteContactClasses(view->contacts().classes(), contacts);
+  const auto live = static_cast<double>(view->contacts().live_count());
+  if (live >= kContactsWarning * static_cast<double>(metadata.max_contacts)) {
+    contacts->set_warning(absl::StrFormat(
+        "%d of max_contacts=%d are live: drop contacts that are gone, or new "
+        "ones will be refused",
+        view->contacts().live_count(), metadata.max_contacts));
+  }
 
   v1::StorageStatus* storage = response->mutable_storage();
   const storage::MissionFileStatus file = context_.file.Status();

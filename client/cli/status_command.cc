@@ -41,6 +41,10 @@ std::string Summary(const v1::GetMissionStatusResponse& s) {
   absl::StrAppendFormat(&text, "contacts    %d live of %d, %d dropped\n",
                         s.contacts().live(), s.contacts().max_contacts(),
                         s.contacts().dropped());
+  if (!s.contacts().warning().empty()) {
+    absl::StrAppendFormat(&text, "            warning: %s\n",
+                          s.contacts().warning());
+  }
   absl::StrAppendFormat(
       &text, "storage     %s + %s log, journal %s, durable to revision %s%s\n",
       BytesText(storage.file_bytes()), BytesText(storage.wal_bytes()),

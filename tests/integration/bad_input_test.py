@@ -2,6 +2,7 @@
 and nothing else lost. Each row: what is wrong, the path that must be named."""
 
 import math
+import time
 import unittest
 
 import grpc
@@ -220,6 +221,10 @@ class BadInput(LiveTest):
                 self.assert_field(
                     "reports[0].range_bearing." + path, call,
                     ingest.ReportContactsRequest(reports=[bad]))
+        ahead = changed(good, "time", None)
+        ahead.time.FromSeconds(int(time.time()) + 25 * 3600)
+        self.assert_field("reports[0].time", call,
+                          ingest.ReportContactsRequest(reports=[ahead]))
         self.assertEqual(self.server.status().contacts.live, 0)
 
     def test_a_bad_ping_costs_only_itself(self):

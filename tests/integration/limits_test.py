@@ -232,7 +232,7 @@ class Limits(LiveTest):
                 depth_m=[10 + i % 7 * 5 for i in range(3600)], std_m=[1])
             imported = import_chart(server, tile)
             self.assertGreater(imported.degraded, 0)
-            report_contacts(server, [fix_report(1, second=10),
+            report_contacts(server, [fix_report(1, second=70),
                                      fix_report(2, second=5)])
             before = server.status()
             self.assertEqual(before.global_map.degraded, imported.degraded)
@@ -283,6 +283,8 @@ class Limits(LiveTest):
                               for r in answer.rejections],
                              [(4, types.REJECT_REASON_CONTACTS_FULL)])
             self.assertIn("full", answer.rejections[0].description)
+            self.assertIn("3 of max_contacts=3",
+                          server.status().contacts.warning)
             # Those that are tracked go on, and a dropped one makes room.
             answer = report_contacts(server, [
                 fix_report(5, 0, 2005, second=1, contact="c1")])
@@ -290,6 +292,7 @@ class Limits(LiveTest):
             server.mission.DropContact(mission.DropContactRequest(
                 source_id="c4i", contact_id="c1", time=at(10)),
                 timeout=DEADLINE_S)
+            self.assertEqual(server.status().contacts.warning, "")
             answer = report_contacts(server, [
                 fix_report(6, 0, 9000, second=11, contact="c4")])
             self.assertEqual(answer.reports_applied, 1)

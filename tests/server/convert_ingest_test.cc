@@ -299,17 +299,32 @@ TEST(ConvertReport, NamesEveryBadField) {
   }
 }
 
+// A day after the samples' time.
+const Time kNow =
+    TimeFromUnixMicros((SampleFix().time().seconds() + 86'400) * 1'000'000);
+
+TEST(ConvertReports, RefusesWhatIsFromTheFuture) {
+  v1::ReportContactsRequest request;
+  *request.add_reports() = SampleFix();
+  const int64_t now_s = SampleFix().time().seconds() + 86'400;
+  request.mutable_reports(0)->mutable_time()->set_seconds(now_s + 86'400 - 1);
+  EXPECT_THAT(ConvertReports(request, kNow), IsOk());
+  request.mutable_reports(0)->mutable_time()->set_seconds(now_s + 86'400 + 1);
+  EXPECT_THAT(ConvertReports(request, kNow), Violates("reports[0].time"));
+}
+
 TEST(ConvertReports, NamesTheReportThatIsWrong) {
   v1::ReportContactsRequest request;
   for (int i = 0; i < 5; ++i) *request.add_reports() = SampleFix();
-  FATHOM_ASSERT_OK_AND_ASSIGN(const auto messages, ConvertReports(request));
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto messages,
+                              ConvertReports(request, kNow));
   EXPECT_EQ(messages.size(), 5U);
   request.mutable_reports(3)->clear_time();
-  EXPECT_THAT(ConvertReports(request), Violates("reports[3].time"));
+  EXPECT_THAT(ConvertReports(request, kNow), Violates("reports[3].time"));
   request.mutable_reports(2)->set_sequence(0);
-  EXPECT_THAT(ConvertReports(request), Violates("reports[2].sequence"));
+  EXPECT_THAT(ConvertReports(request, kNow), Violates("reports[2].sequence"));
   request.clear_reports();
-  EXPECT_THAT(ConvertReports(request), Violates("reports"));
+  EXPECT_THAT(ConvertReports(request, kNow), Violates("reports"));
 }
 
 TEST(ConvertReports, TakesTheMostReportsAndNotOneMore) {
@@ -317,9 +332,9 @@ TEST(ConvertReports, TakesTheMostReportsAndNotOneMore) {
   for (size_t i = 0; i < kMaxReportsPerRequest; ++i) {
     *request.add_reports() = SampleFix();
   }
-  EXPECT_THAT(ConvertReports(request), IsOk());
+  EXPECT_THAT(ConvertReports(request, kNow), IsOk());
   *request.add_reports() = SampleFix();
-  EXPECT_THAT(ConvertReports(request),
+  EXPECT_THAT(ConvertReports(request, kNow),
               StatusIs(absl::StatusCode::kResourceExhausted));
 }
 

@@ -1,0 +1,206 @@
+"""Contacts through a live server: recorded radar against GPS truth, reports
+that come late, outliers, kills between them.
+
+Needs python3-grpcio alone.
+"""
+
+import json
+import math
+import os
+import pathlib
+import random
+import statistics
+import unittest
+
+from live_server import (DEADLINE_S, START_S, LiveTest, fix_report,
+                         ingest, obstacle, report_contacts, types)
+
+# The radar's frame (contacts/autoferry/README.md).
+PIREN = (63.4389029083, 10.39908278)
+M_PER_LAT = 111_480.0  # Good to 0.1 % within a kilometre of it.
+M_PER_LON = 49_910.0
+RADAR = 2
+RANGE_STD_M, BEARING_STD_DEG = 4.9, 5.2
+OF_TARGET_M = 40
+
+
+def position(north_m, east_m):
+    return types.GeodeticPoint(latitude_deg=PIREN[0] + north_m / M_PER_LAT,
+                               longitude_deg=PIREN[1] + east_m / M_PER_LON)
+
+
+def radar_reports(folder, scenario):
+    """The detections of one recording that lie at a target, in order: pairs
+    of (report without number, the target's place then)."""
+    def read(what):
+        path = folder / f"scenario{scenario}_{what}.json"
+        return json.loads(path.read_text())
+    pairs = []
+    for scan, truths in zip(read("detections"), read("groundTruth")):
+        measured = scan["measurement"]
+        if scan["sensorID"] != RADAR or len(measured) != 2:
+            continue
+        if isinstance(measured[0], (int, float)):
+            measured = [[measured[0]], [measured[1]]]
+        own = scan["ownshipPosition"]
+        for truth in truths:
+            there = truth["position"][:2]
+            away = [(math.hypot(n + own[0] - there[0], e + own[1] - there[1]),
+                     n, e) for n, e in zip(*measured)]
+            off_m, n, e = min(away)
+            if off_m > OF_TARGET_M:
+                continue
+            report = ingest.ContactReport(
+                source_id="radar", epoch=1,
+                contact_id=f"s{scenario}.{truth['targetID']}",
+                contact_class=types.CONTACT_CLASS_SMALL_CRAFT)
+            report.time.FromMicroseconds(round(scan["time"] * 1e6))
+            seen = report.range_bearing
+            seen.pose.position.CopyFrom(position(*own))
+            seen.range_m = math.hypot(n, e)
+            seen.bearing_deg = math.degrees(math.atan2(e, n))
+            seen.range_std_m = RANGE_STD_M
+            seen.bearing_std_deg = BEARING_STD_DEG
+            pairs.append((report, there))
+    return pairs
+
+
+def stream(server, reports, first=1):
+    """Numbers and sends reports on one stream; returns the rejections."""
+    for number, report in enumerate(reports, first):
+        report.sequence = number
+    rejections = []
+    for ack in server.ingest.StreamContacts(
+            iter([ingest.StreamContactsRequest(report=r) for r in reports]),
+            timeout=DEADLINE_S):
+        rejections += ack.rejections
+    return rejections
+
+
+def history(server, source, contact):
+    return [estimate for part in server.obstacle.GetContactHistory(
+        obstacle.GetContactHistoryRequest(source_id=source,
+                                          contact_id=contact),
+        timeout=DEADLINE_S) for estimate in part.estimates]
+
+
+class RecordedRadar(LiveTest):
+    """Five recordings of two boats each, against their GPS."""
+
+    def test_tracks_are_kept_through_a_kill(self):
+        folder = pathlib.Path(os.environ["FATHOM_SHARED_DATA_DIR"])
+        folder = folder / "contacts" / "autoferry"
+        if not folder.is_dir():
+            self.skipTest(f"no recordings in {folder}")
+        pairs = [pair for scenario in (2, 3, 4, 5, 13)
+                 for pair in radar_reports(folder, scenario)]
+        pairs.sort(key=lambda pair: pair[0].time.ToMicroseconds())
+        reports = [report for report, _ in pairs]
+        half = len(reports) // 2
+        with self.new_mission() as server:
+            rejections = stream(server, reports[:half])
+            server.kill()
+        with self.reopen() as server:
+            rejections += stream(server, reports[half:], first=half + 1)
+            status = server.status()
+            places = {}
+            for report, there in pairs:
+                places.setdefault(report.contact_id, {})[
+                    report.time.ToMicroseconds()] = there
+            rmse_m = []
+            for contact, truths in places.items():
+                squares = []
+                for estimate in history(server, "radar", contact):
+                    there = truths[estimate.time.ToMicroseconds()]
+                    north_m = (estimate.position.latitude_deg
+                               - PIREN[0]) * M_PER_LAT
+                    east_m = (estimate.position.longitude_deg
+                              - PIREN[1]) * M_PER_LON
+                    squares.append((north_m - there[0]) ** 2
+                                   + (east_m - there[1]) ** 2)
+                rmse_m.append(math.sqrt(statistics.fmean(squares)))
+                # Fused, all but what the gate refused.
+                self.assertGreaterEqual(len(squares), 0.95 * len(truths))
+        self.assertEqual(len(rmse_m), 10)
+        self.assertEqual(status.contacts.live, 10)
+        self.assertLess(len(rejections), 0.02 * len(reports))
+        for rejection in rejections:
+            self.assertEqual(rejection.reason, types.REJECT_REASON_GATED)
+        print(f"{len(reports)} radar reports, 10 tracks, {len(rejections)} "
+              f"gated: median rmse {statistics.median(rmse_m):.1f} m as "
+              "recorded, biases and all (plain filter 8.0 m)")
+        self.assertLess(statistics.median(rmse_m), 11)
+
+
+class LateReports(LiveTest):
+    def test_the_order_of_arrival_does_not_matter(self):
+        draw = random.Random(4)
+        reports = []
+        for i in range(80):
+            report = fix_report(1, 1000 + 5 * i, 0, second=i, vn=5.0, ve=0.0)
+            if i % 10 != 0:
+                report.range_bearing.pose.position.CopyFrom(
+                    fix_report(1).fix.position)
+                report.range_bearing.range_m = 1000 + 5 * i + draw.gauss(0, 5)
+                report.range_bearing.bearing_deg = draw.gauss(0, 1)
+                report.range_bearing.range_std_m = 5
+                report.range_bearing.bearing_std_deg = 1
+            if i in (7, 33, 46, 59, 72):
+                report.range_bearing.bearing_deg += 60  # An outlier.
+            reports.append(report)
+        late = sorted(range(80), key=lambda i: i + draw.uniform(0, 40))
+        with self.new_mission(name="a.fathom") as server:
+            gated = stream(server, reports)
+            ordered = history(server, "c4i", "ship")
+        with self.new_mission(name="b.fathom") as server:
+            stream(server, [reports[i] for i in late[:40]])
+            server.kill()
+        with self.reopen("b.fathom") as server:
+            stream(server, [reports[i] for i in late[40:]], first=41)
+            self.assertEqual(history(server, "c4i", "ship"), ordered)
+            digest = server.status(digest=True).map_digest
+            server.kill()
+        with self.reopen("b.fathom") as server:
+            self.assertEqual(server.status(digest=True).map_digest, digest)
+            self.assertEqual(history(server, "c4i", "ship"), ordered)
+        self.assertEqual(len(gated), 5)
+        self.assertEqual(len(ordered), 75)
+
+    def test_older_than_the_window_is_refused_with_the_reason(self):
+        with self.new_mission() as server:
+            for number, second in ((1, 100), (2, 40), (3, 39)):
+                answer = report_contacts(server, [
+                    fix_report(number, second=second, ve=0.0)])
+                self.assertEqual(answer.reports_applied, int(second >= 40))
+            self.assertEqual(answer.rejections[0].reason,
+                             types.REJECT_REASON_TOO_LATE)
+            self.assertIn("60 s", answer.rejections[0].description)
+            self.assertEqual(server.status().contacts.live, 1)
+
+
+class Outliers(LiveTest):
+    def test_one_is_refused_and_the_second_that_agrees_begins_anew(self):
+        with self.new_mission() as server:
+            answer = report_contacts(server, [
+                fix_report(1, second=0, ve=0.0),
+                fix_report(2, 90_000, second=10, ve=0.0),
+                fix_report(3, second=20, ve=0.0)])
+            self.assertEqual([(r.sequence, r.reason)
+                              for r in answer.rejections],
+                             [(2, types.REJECT_REASON_GATED)])
+            # Two that agree: the contact is there.
+            answer = report_contacts(server, [
+                fix_report(4, 90_000, second=30, ve=0.0),
+                fix_report(5, 90_000, second=40, ve=0.0)])
+            self.assertEqual(answer.reports_applied, 1)
+            track = history(server, "c4i", "ship")
+            self.assertEqual([e.time.seconds - START_S for e in track],
+                             [0, 20, 30, 40])
+            self.assertEqual(track[-1].report_count, 2)
+            gated = {r.reason: r.count for r in
+                     server.status().contacts.rejects}
+            self.assertEqual(gated[types.REJECT_REASON_GATED], 2)
+
+
+if __name__ == "__main__":
+    unittest.main()
