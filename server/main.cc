@@ -20,6 +20,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -31,6 +32,7 @@
 #include "server/map_keeper.h"
 #include "server/mission.h"
 #include "server/mission_store.h"
+#include "server/mission_tool.h"
 #include "server/server.h"
 #include "server/server_context.h"
 #include "storage/mission_file.h"
@@ -56,6 +58,10 @@ and answers "is there an obstacle at this place, time and confidence?".
 
   Serve it again later:
     fathomd --mission bay.fathom
+
+  Work on a mission file that no server holds (info, verify, digest, repair,
+  compact, export):
+    fathomd mission verify bay.fathom
 
 When it serves, it prints one line on standard output:
   fathomd: ready on ADDR mission FILE revision N
@@ -310,4 +316,9 @@ int Main(int argc, char** argv) {
 }  // namespace
 }  // namespace fathom::server
 
-int main(int argc, char** argv) { return fathom::server::Main(argc, argv); }
+int main(int argc, char** argv) {
+  if (argc > 1 && std::string_view(argv[1]) == "mission") {
+    return fathom::server::MissionToolMain(argc - 1, argv + 1);
+  }
+  return fathom::server::Main(argc, argv);
+}

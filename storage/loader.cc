@@ -345,4 +345,25 @@ absl::StatusOr<Loaded> LoadMission(Connection& connection) {
   return loaded;
 }
 
+absl::StatusOr<Loaded> SalvageMission(Connection& connection) {
+  Loaded loaded;
+  FATHOM_ASSIGN_OR_RETURN(loaded.metadata, ReadMetadata(connection));
+  FATHOM_RETURN_IF_ERROR(LoadCheckpointMark(connection, loaded));
+  loaded.revision = loaded.checkpoint_revision;
+  // A step keeps what it had read before it met the damage.
+  const auto note = [&loaded](const absl::Status& status) {
+    if (!absl::IsDataLoss(status)) return status;
+    loaded.damage.push_back(std::string(status.message()));
+    return absl::OkStatus();
+  };
+  FATHOM_RETURN_IF_ERROR(note(LoadTiles(connection, loaded)));
+  FATHOM_RETURN_IF_ERROR(note(LoadActivities(connection, loaded)));
+  FATHOM_RETURN_IF_ERROR(note(LoadContacts(connection, loaded)));
+  auto positions = LoadSourcePositions(connection);
+  if (positions.ok()) loaded.source_positions = *std::move(positions);
+  FATHOM_RETURN_IF_ERROR(note(positions.status()));
+  FATHOM_RETURN_IF_ERROR(note(LoadJournal(connection, loaded)));
+  return loaded;
+}
+
 }  // namespace fathom::storage

@@ -16,6 +16,11 @@ namespace fathom::storage {
 // Errors: DATA_LOSS naming the row whose blob is damaged; those of sqlite.h.
 absl::StatusOr<Loaded> LoadMission(Connection& connection);
 
+// The same of a damaged mission: what cannot be read is left out and told in
+// Loaded::damage; of the journal, all from the first bad segment on. Errors:
+// DATA_LOSS if the mission's own row cannot be read.
+absl::StatusOr<Loaded> SalvageMission(Connection& connection);
+
 absl::StatusOr<std::vector<SourcePosition>> LoadSourcePositions(
     Connection& connection);
 

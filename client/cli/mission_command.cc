@@ -2,9 +2,12 @@
 // file.
 
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "absl/strings/str_format.h"
 #include "base/status_macros.h"
+#include "client/cli/mission_file.h"
 #include "client/cli/session.h"
 #include "client/cli/text.h"
 
@@ -102,6 +105,25 @@ absl::Status Verify(const Session& session) {
                     : absl::DataLossError("the mission file is damaged");
 }
 
+// A verb for files alone.
+void AddFileVerb(CLI::App& mission, Session& session, const std::string& name,
+                 const std::string& about, bool has_output) {
+  CLI::App* verb = mission.add_subcommand(name, about);
+  const auto files = std::make_shared<std::vector<std::string>>();
+  verb->add_option(
+          "FILE", *files,
+          has_output ? "The mission, and the file to make" : "The mission")
+      ->required()
+      ->expected(has_output ? 2 : 1);
+  verb->callback([&session, name, files]() {
+    session.run = [&session, name, files]() {
+      std::vector<std::string> arguments = {name};
+      arguments.insert(arguments.end(), files->begin(), files->end());
+      return WorkOnMissionFile(session, arguments);
+    };
+  });
+}
+
 }  // namespace
 
 void AddMission(CLI::App& app, Session& session) {
@@ -111,12 +133,25 @@ void AddMission(CLI::App& app, Session& session) {
   verb->footer(
       "\nExamples:\n  fathom mission info\n"
       "  fathom mission save before-dive.fathom\n"
-      "  fathom mission verify --json");
+      "  fathom mission verify --json\n"
+      "  fathom mission verify --file old.fathom\n"
+      "  fathom mission export old.fathom tracks.gpkg");
 
-  verb->add_subcommand("info", "Identity, area, datum, limits, contact classes")
-      ->callback([&session]() {
-        session.run = [&session]() { return Info(session); };
-      });
+  const auto file = std::make_shared<std::string>();
+  const auto add_file = [&file](CLI::App* to) {
+    to->add_option("--file", *file,
+                   "Of this file, which no server holds, not of the server's")
+        ->type_name("FILE");
+  };
+  CLI::App* info = verb->add_subcommand(
+      "info", "Identity, area, datum, limits, contact classes");
+  add_file(info);
+  info->callback([&session, file]() {
+    session.run = [&session, file]() {
+      return file->empty() ? Info(session)
+                           : WorkOnMissionFile(session, {"info", *file});
+    };
+  });
 
   CLI::App* save = verb->add_subcommand(
       "save", "Write a consistent copy beside the mission while it runs");
@@ -127,10 +162,24 @@ void AddMission(CLI::App& app, Session& session) {
     session.run = [&session, file_name]() { return Save(session, *file_name); };
   });
 
-  verb->add_subcommand("verify", "Check the mission file's integrity")
-      ->callback([&session]() {
-        session.run = [&session]() { return Verify(session); };
-      });
+  CLI::App* verify =
+      verb->add_subcommand("verify", "Check the mission file's integrity");
+  add_file(verify);
+  verify->callback([&session, file]() {
+    session.run = [&session, file]() {
+      return file->empty() ? Verify(session)
+                           : WorkOnMissionFile(session, {"verify", *file});
+    };
+  });
+
+  AddFileVerb(*verb, session, "digest", "The digest of a file's map", false);
+  AddFileVerb(*verb, session, "repair",
+              "Save all that can be read of a file into a new mission", true);
+  AddFileVerb(*verb, session, "compact",
+              "Rewrite a file without its free pages, in place", false);
+  AddFileVerb(*verb, session, "export",
+              "A file's contact history as a GeoPackage, for GDAL and QGIS",
+              true);
 }
 
 }  // namespace fathom::client::cli

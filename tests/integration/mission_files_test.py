@@ -1,0 +1,146 @@
+"""Mission files that no server holds: `fathomd mission` and `fathom mission`."""
+
+import hashlib
+import json
+import os
+import shutil
+import sqlite3
+import subprocess
+import unittest
+
+from live_server import (DEADLINE_S, FATHOM, FATHOMD, LiveTest, fix_report,
+                         import_chart, ping, report_contacts, send_pings,
+                         start_activity)
+
+
+def run(*command):
+    return subprocess.run([str(c) for c in command], capture_output=True,
+                          text=True, timeout=DEADLINE_S, check=False,
+                          env={**os.environ, "FATHOMD": FATHOMD})
+
+
+class MissionFiles(LiveTest):
+
+    def setUp(self):
+        super().setUp()
+        self.path = self.folder / "m.fathom"
+        with self.new_mission() as server:
+            import_chart(server)
+            start_activity(server)
+            send_pings(server, [ping(i, [(105, 105, 20.0 + i, 3.0)])
+                                for i in range(1, 21)])
+            report_contacts(server, [
+                fix_report(i, 5 * i, 0, second=i,
+                           contact=["ship", "boat", "once"][
+                               2 if i == 9 else i % 2])
+                for i in range(1, 20)])
+            self.digest = server.status(digest=True).map_digest
+            self.revision = server.status().stamp.map_revision
+            busy = run(FATHOMD, "mission", "verify", self.path)
+            self.assertEqual(busy.returncode, 1)
+            self.assertIn("in use", busy.stderr)
+            server.kill()  # A log is left: part of the mission.
+
+    def verb(self, name, *arguments, code=0):
+        done = run(FATHOMD, "mission", name, *arguments, "--json")
+        self.assertEqual(done.returncode, code, done.stderr)
+        return json.loads(done.stdout)
+
+    def damage(self):
+        self.verb("compact", self.path)  # All into one file.
+        raw = sqlite3.connect(f"file:{self.path}?mode=ro", uri=True)
+        [root] = raw.execute("SELECT rootpage FROM sqlite_schema WHERE name = "
+                             "'tile'").fetchone()
+        raw.close()
+        content = bytearray(self.path.read_bytes())
+        content[(root - 1) * 8192 + 4000] ^= 1
+        self.path.write_bytes(content)
+
+    def test_what_a_file_holds_is_told_and_the_file_stays_as_it_is(self):
+        before = hashlib.sha256(self.path.read_bytes()).hexdigest()
+        info = self.verb("info", self.path)
+        self.assertEqual(info["name"], "test")
+        self.assertEqual(info["vertical_datum"], "MLLW")
+        self.assertEqual(info["history_rows"], 19)
+        self.assertEqual(info["contacts"], 3)
+        proof = self.verb("verify", self.path)
+        self.assertEqual(proof["sound"], "yes")
+        self.assertEqual(proof["map_digest"], self.digest)
+        self.assertEqual(proof["map_revision"], self.revision)
+        self.assertEqual(self.verb("digest", self.path)["map_digest"],
+                         self.digest)
+        self.assertEqual(
+            hashlib.sha256(self.path.read_bytes()).hexdigest(), before)
+
+    def test_the_client_hands_files_to_fathomd(self):
+        done = run(FATHOM, "--json", "mission", "verify", "--file", self.path)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(json.loads(done.stdout)["map_digest"], self.digest)
+        done = run(FATHOM, "mission", "digest", self.path)
+        self.assertIn(self.digest, done.stdout)
+        missing = run(FATHOM, "mission", "digest", self.folder / "none")
+        self.assertEqual(missing.returncode, 1)
+        self.assertIn("no such mission", missing.stderr)
+
+    def test_compact_keeps_the_map(self):
+        self.assertEqual(
+            self.verb("compact", self.path)["file_bytes"],
+            self.path.stat().st_size)
+        self.assertEqual(self.verb("verify", self.path)["map_digest"],
+                         self.digest)
+
+    def test_damage_is_found_and_the_rest_repaired_into_a_new_mission(self):
+        self.damage()
+        proof = self.verb("verify", self.path, code=4)
+        self.assertEqual(proof["sound"], "no")
+        self.assertTrue(any("checksum" in p for p in proof["problems"]))
+        fixed = self.folder / "fixed.fathom"
+        before = hashlib.sha256(self.path.read_bytes()).hexdigest()
+        repair = self.verb("repair", self.path, fixed)
+        self.assertGreater(len(repair["left_out"]), 0)
+        self.assertEqual(repair["history_rows"], 19)
+        self.assertEqual(
+            hashlib.sha256(self.path.read_bytes()).hexdigest(), before)
+        proof = self.verb("verify", fixed)
+        self.assertEqual(proof["sound"], "yes")
+        self.assertEqual(proof["map_digest"], repair["map_digest"])
+        # It goes on where the damaged one was: what was taken is a resend.
+        with self.reopen("fixed.fathom") as server:
+            ack, _ = send_pings(server, [ping(i, [(105, 105, 20.0 + i, 3.0)])
+                                         for i in range(1, 26)])
+            self.assertEqual((ack.pings_duplicate, ack.pings_applied), (20, 5))
+
+    def test_a_sound_mission_repaired_is_the_same(self):
+        fixed = self.folder / "fixed.fathom"
+        repair = self.verb("repair", self.path, fixed)
+        self.assertEqual(repair["left_out"], [])
+        self.assertEqual(repair["map_digest"], self.digest)
+        self.assertEqual(self.verb("verify", fixed)["map_digest"], self.digest)
+
+    def test_contact_history_opens_in_gdal_as_points_and_lines(self):
+        out = self.folder / "tracks.gpkg"
+        self.assertEqual(self.verb("export", self.path, out),
+                         {"points": 19, "tracks": 2})
+        ogrinfo = shutil.which("ogrinfo")
+        if ogrinfo is None:
+            self.skipTest("no ogrinfo (gdal-bin)")
+        layers = run(ogrinfo, "-ro", "-so", "-al", out)
+        self.assertEqual(layers.returncode, 0, layers.stderr)
+        self.assertNotIn("Warning", layers.stderr)
+        self.assertIn("Layer name: contact_points", layers.stdout)
+        self.assertIn("Geometry: Point", layers.stdout)
+        self.assertIn("Feature Count: 19", layers.stdout)
+        self.assertIn("Layer name: contact_tracks", layers.stdout)
+        self.assertIn("Geometry: Line String", layers.stdout)
+        self.assertIn("Feature Count: 2", layers.stdout)
+        self.assertIn("WGS 84", layers.stdout)
+        boats = run(ogrinfo, "-ro", out, "contact_tracks", "-where",
+                    "contact_id = 'boat'")
+        # Odd reports: 5 m and more north of 41.5 N, 71.4 W.
+        self.assertIn("LINESTRING (-71.4", boats.stdout)
+        self.assertIn("start_time (DateTime) = 2026/01/01 00:00:01",
+                      boats.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()
