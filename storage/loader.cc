@@ -360,8 +360,8 @@ absl::StatusOr<Loaded> SalvageMission(Connection& connection) {
   FATHOM_RETURN_IF_ERROR(note(LoadActivities(connection, loaded)));
   FATHOM_RETURN_IF_ERROR(note(LoadContacts(connection, loaded)));
   auto positions = LoadSourcePositions(connection);
-  if (positions.ok()) loaded.source_positions = *std::move(positions);
   FATHOM_RETURN_IF_ERROR(note(positions.status()));
+  if (positions.ok()) loaded.source_positions = *std::move(positions);
   FATHOM_RETURN_IF_ERROR(note(LoadJournal(connection, loaded)));
   return loaded;
 }
