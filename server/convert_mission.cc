@@ -430,6 +430,8 @@ void WriteLimits(v1::Limits* out) {
   out->set_max_revision_waiters(kMaxRevisionWaiters);
   out->set_max_pending_commands(kMaxPendingCommands);
   out->set_max_sources(SourceLedger::kMaxSources);
+  out->set_max_searches(kMaxSearches);
+  out->set_max_search_cells(kMaxSearchCells);
 }
 
 }  // namespace fathom::server

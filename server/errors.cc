@@ -89,6 +89,16 @@ absl::Status LimitExceeded(std::string_view path, uint64_t count,
   return status;
 }
 
+absl::Status TooManyCells(std::string_view path, uint64_t limit) {
+  absl::Status status = absl::ResourceExhaustedError(absl::StrFormat(
+      "%s: more than the limit of %d cells of the map would have to be read; "
+      "ask about less of it at a time",
+      path, limit));
+  AttachReason(status, "LIMIT_EXCEEDED",
+               {{"field", std::string(path)}, {"limit", absl::StrCat(limit)}});
+  return status;
+}
+
 absl::Status TooManyCalls(std::string_view kind, uint64_t limit) {
   absl::Status status = absl::ResourceExhaustedError(absl::StrFormat(
       "already %d %s are open, the most allowed; end one first", limit, kind));

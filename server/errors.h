@@ -39,6 +39,11 @@ absl::Status InvalidField(
 absl::Status LimitExceeded(std::string_view path, uint64_t count,
                            uint64_t limit);
 
+// RESOURCE_EXHAUSTED: to answer for the field at `path` more than `limit` cells
+// would have to be read. ErrorInfo LIMIT_EXCEEDED with the metadata field and
+// limit.
+absl::Status TooManyCells(std::string_view path, uint64_t limit);
+
 // RESOURCE_EXHAUSTED: too many calls of this kind at once. RetryInfo.
 absl::Status TooManyCalls(std::string_view kind, uint64_t limit);
 

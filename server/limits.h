@@ -39,6 +39,10 @@ inline constexpr std::chrono::hours kMostAhead{24};
 // Share of max_contacts from which GetMissionStatus warns.
 inline constexpr double kContactsWarning = 0.9;
 
+// Most cells of the map that one CheckTrajectory or FindNearestObstacle reads:
+// one to four seconds of a thread, and at most 200 MB while it searches.
+inline constexpr uint64_t kMaxSearchCells = 4'000'000;
+
 // Most reports in ReportContacts: an AIS receiver hears a few hundred ships a
 // minute; 1000 reports are one group commit.
 inline constexpr size_t kMaxReportsPerRequest = 1000;
@@ -111,6 +115,10 @@ inline constexpr double kMaxSmoothingDistanceM = 1000;
 // a cell's corners bow too far to be bounded closely.
 inline constexpr double kMinResolutionM = 0.1;
 inline constexpr double kMaxResolutionM = 100'000;
+// Radius of a vehicle on a trajectory, and its own position's std: a swept
+// width of some kilometres at most.
+inline constexpr double kMaxVehicleRadiusM = 1000;
+inline constexpr double kMaxVehicleStdM = 1000;
 // Step of a chart's grid, degrees.
 inline constexpr double kMaxStepDeg = 10;
 // How far before and behind the base time a point of a batch may lie: 10
@@ -149,6 +157,12 @@ inline constexpr size_t kMaxBulkStreams = 64;
 // Threads for them and for digests: one on a vehicle's second core, two
 // ashore; gRPC's own stay free for short calls.
 inline constexpr size_t kWorkerThreads = 2;
+// CheckTrajectory and FindNearestObstacle calls at once, under way or waiting
+// for a thread: each holds at most 0.4 MB of waypoints.
+inline constexpr size_t kMaxSearches = 256;
+// Threads for them, apart from the bulk streams': an avoidance loop must not
+// queue behind 64 exports.
+inline constexpr size_t kSearchThreads = 2;
 // Concurrent watchers (issue of the watch RPCs).
 inline constexpr int kMaxWatchers = 256;
 // Queries that wait for a min_revision.

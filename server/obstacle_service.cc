@@ -6,10 +6,14 @@
 #include <utility>
 
 #include "base/status_macros.h"
+#include "map/obstacle_map/check_trajectory.h"
+#include "map/obstacle_map/find_nearest.h"
 #include "server/convert_common.h"
 #include "server/convert_query.h"
+#include "server/convert_trajectory.h"
 #include "server/field_checks.h"
 #include "server/region.h"
+#include "server/search_call.h"
 
 namespace fathom::server {
 namespace {
@@ -26,6 +30,17 @@ grpc::ServerUnaryReactor* Reply(grpc::CallbackServerContext* call,
 absl::Status TooManyBulkStreams() {
   return TooManyCalls("GetRegion and GetContactHistory streams",
                       kMaxBulkStreams);
+}
+
+absl::Status TooManySearches() {
+  return TooManyCalls("CheckTrajectory and FindNearestObstacle calls",
+                      kMaxSearches);
+}
+
+// What the map says of a search, as the client is to see it.
+absl::Status SearchError(const absl::Status& status, const char* path) {
+  return absl::IsResourceExhausted(status) ? TooManyCells(path, kMaxSearchCells)
+                                           : status;
 }
 
 // A server stream that ends at once with an error.
@@ -266,15 +281,64 @@ ObstacleService::GetContactHistory(
 }
 
 grpc::ServerUnaryReactor* ObstacleService::CheckTrajectory(
-    grpc::CallbackServerContext* call, const v1::CheckTrajectoryRequest*,
-    v1::CheckTrajectoryResponse*) {
-  return Reply(call, NotYet("CheckTrajectory"));
+    grpc::CallbackServerContext* call,
+    const v1::CheckTrajectoryRequest* request,
+    v1::CheckTrajectoryResponse* response) {
+  const FieldPath root;
+  const FieldPath path(root, "trajectory");
+  absl::StatusOr<map::Trajectory> trajectory =
+      ConvertTrajectory(request->trajectory(), path);
+  if (!trajectory.ok()) return Reply(call, trajectory.status());
+  if (!context_.search_calls.Take()) return Reply(call, TooManySearches());
+  auto* search = new SearchCall(
+      context_,
+      [response, stop_at_first = request->stop_at_first(),
+       trajectory = *std::move(trajectory)](
+          const map::ObstacleMapView& view,
+          const std::atomic<bool>& stop) -> absl::Status {
+        const auto verdict =
+            map::CheckTrajectory(view, trajectory,
+                                 {.stop_at_first = stop_at_first,
+                                  .most_cells = kMaxSearchCells,
+                                  .stop = &stop});
+        if (!verdict.ok()) {
+          return SearchError(verdict.status(), "trajectory.waypoints");
+        }
+        WriteVerdict(*verdict, response);
+        WriteStamp(view, response->mutable_stamp());
+        return absl::OkStatus();
+      });
+  AtRevision(context_, *call, request->min_revision(),
+             [search](const absl::Status& status, const ViewPtr& view) {
+               search->Begin(status, view);
+             });
+  return search;
 }
 
 grpc::ServerUnaryReactor* ObstacleService::FindNearestObstacle(
-    grpc::CallbackServerContext* call, const v1::FindNearestObstacleRequest*,
-    v1::FindNearestObstacleResponse*) {
-  return Reply(call, NotYet("FindNearestObstacle"));
+    grpc::CallbackServerContext* call,
+    const v1::FindNearestObstacleRequest* request,
+    v1::FindNearestObstacleResponse* response) {
+  absl::StatusOr<map::NearestQuestion> question =
+      ConvertNearest(*request, context_.clock.Now());
+  if (!question.ok()) return Reply(call, question.status());
+  if (!context_.search_calls.Take()) return Reply(call, TooManySearches());
+  auto* search = new SearchCall(
+      context_,
+      [response, question = *question](
+          const map::ObstacleMapView& view,
+          const std::atomic<bool>& stop) -> absl::Status {
+        const auto nearest = map::FindNearestObstacle(
+            view, question, {.most_cells = kMaxSearchCells, .stop = &stop});
+        if (!nearest.ok()) {
+          return SearchError(nearest.status(), "search_radius_m");
+        }
+        if (nearest->has_value()) WriteNearest(**nearest, response);
+        WriteStamp(view, response->mutable_stamp());
+        return absl::OkStatus();
+      });
+  search->Begin(absl::OkStatus(), context_.keeper.View());
+  return search;
 }
 
 grpc::ServerWriteReactor<v1::WatchRegionResponse>* ObstacleService::WatchRegion(

@@ -35,7 +35,6 @@ class ObstacleService final : public v1::ObstacleService::CallbackService {
       grpc::CallbackServerContext* call,
       const v1::GetContactHistoryRequest* request) override;
 
-  // In the contract, not offered yet: UNIMPLEMENTED.
   grpc::ServerUnaryReactor* CheckTrajectory(
       grpc::CallbackServerContext* call,
       const v1::CheckTrajectoryRequest* request,
@@ -44,6 +43,8 @@ class ObstacleService final : public v1::ObstacleService::CallbackService {
       grpc::CallbackServerContext* call,
       const v1::FindNearestObstacleRequest* request,
       v1::FindNearestObstacleResponse* response) override;
+
+  // In the contract, not offered yet: UNIMPLEMENTED.
   grpc::ServerWriteReactor<v1::WatchRegionResponse>* WatchRegion(
       grpc::CallbackServerContext* call,
       const v1::WatchRegionRequest* request) override;

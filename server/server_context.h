@@ -36,7 +36,10 @@ struct ServerContext {
   Workers courier{1};
   // Long ones: a block of a region, a digest, a page of history.
   Workers workers{kWorkerThreads};
+  // Trajectories and nearest obstacles.
+  Workers searches{kSearchThreads};
   CallSlots bulk_calls{kMaxBulkStreams};
+  CallSlots search_calls{kMaxSearches};
   // SaveMission and VerifyMission: each reads the whole file and holds another
   // map.
   CallSlots file_calls{1};

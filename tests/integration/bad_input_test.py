@@ -94,6 +94,61 @@ class BadInput(LiveTest):
             self.assert_field(f"{field}[0]", call,
                               changed(good, field, [value]))
 
+    def test_find_nearest_obstacle(self):
+        good = obstacle.FindNearestObstacleRequest(
+            position=point(0, 0), depth_m=5, time=at(0), confidence=0.9,
+            search_radius_m=100)
+        call = self.server.obstacle.FindNearestObstacle
+        call(good, timeout=DEADLINE_S)
+        self.check(call, good, [
+            ("position", None), ("position.latitude_deg", NAN),
+            ("position.longitude_deg", 181), ("depth_m", NAN),
+            ("depth_m", 12001), ("confidence", 0.5), ("confidence", NAN),
+            ("vertical_clearance_m", -1), ("vertical_clearance_m", INF),
+            ("search_radius_m", 0), ("search_radius_m", NAN),
+            ("search_radius_m", 50000.1), ("treat_unknown_as", 7),
+        ])
+        self.assert_field("time", call, changed(good, "time.nanos", -1))
+        level = changed(good, "depth_m", 5)
+        level.vertical_reference.reference = \
+            types.DEPTH_REFERENCE_WATER_SURFACE
+        self.assert_field("vertical_reference.water_level_m", call, level)
+
+    def test_check_trajectory(self):
+        trajectory = obstacle.Trajectory(confidence=0.9)
+        for i in range(3):
+            waypoint = trajectory.waypoints.add(depth_m=5, time=at(10 * i))
+            waypoint.position.CopyFrom(point(10 * i, 0))
+        good = obstacle.CheckTrajectoryRequest(trajectory=trajectory)
+        call = self.server.obstacle.CheckTrajectory
+        call(good, timeout=DEADLINE_S)
+        self.check(call, good, [("trajectory." + field, value)
+                                for field, value in [
+            ("radius_m", -1), ("radius_m", NAN), ("radius_m", 1000.1),
+            ("vertical_clearance_m", -1), ("vertical_clearance_m", INF),
+            ("position_std_m", -1), ("position_std_m", NAN),
+            ("position_std_m", 1000.1), ("confidence", 1.0),
+            ("confidence", NAN), ("treat_unknown_as", 3)]])
+        self.assert_field("trajectory.waypoints", call,
+                          obstacle.CheckTrajectoryRequest())
+        for path, value, field in [
+            ("position", None, "position"),
+            ("position.latitude_deg", NAN, "position.latitude_deg"),
+            ("position.longitude_deg", -181, "position.longitude_deg"),
+            # A degree of latitude: longer than a leg may be.
+            ("position.latitude_deg", 42.5, "position"),
+            ("depth_m", NAN, "depth_m"), ("depth_m", 12001, "depth_m"),
+            ("time", None, "time"), ("time.nanos", -1, "time"),
+            ("time.seconds", at(0).seconds, "time"),
+        ]:
+            with self.subTest(path=path, value=value):
+                bad = obstacle.CheckTrajectoryRequest()
+                bad.CopyFrom(good)
+                bad.trajectory.waypoints[1].CopyFrom(
+                    changed(good.trajectory.waypoints[1], path, value))
+                self.assert_field("trajectory.waypoints[1]." + field, call,
+                                  bad)
+
     def test_start_activity(self):
         good = mission.StartActivityRequest(
             activity_id="other", time=at(0),

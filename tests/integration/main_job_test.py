@@ -216,10 +216,6 @@ class MainJob(LiveTest):
     def test_what_is_not_built_yet_says_so(self):
         with self.new_mission() as server:
             for call, request in [
-                (server.obstacle.CheckTrajectory,
-                 obstacle.CheckTrajectoryRequest()),
-                (server.obstacle.FindNearestObstacle,
-                 obstacle.FindNearestObstacleRequest()),
                 (server.obstacle.WatchRegion, obstacle.WatchRegionRequest()),
                 (server.obstacle.WatchContacts,
                  obstacle.WatchContactsRequest()),
