@@ -18,6 +18,10 @@ enum class ExitCode : int {
   kUnreachable = 3,
   // A file given is missing, damaged or not usable.
   kBadFile = 4,
+  // `fathom check`: the trajectory meets an obstacle, or what counts as one.
+  kConflict = 5,
+  // `fathom check`: it meets none, but is not FREE throughout.
+  kUncertain = 6,
 };
 
 // Marks an error so that the command ends with kUsage or kBadFile. The code

@@ -21,6 +21,8 @@ Examples:
   fathom status
   fathom prior import etopo5.cdf --positive up --std-m 10
   fathom query --at 41.6,-71.4 --depth-m 20 --confidence 0.95
+  fathom check plan.csv --radius-m 5 --clearance-m 3
+  fathom nearest --at 41.6,-71.4 --depth-m 20
   fathom activity start bay --center 41.6,-71.4 --size-m 1000 --cell-m 10
   fathom contacts list --time +10min
   fathom export --activity bay --out bay.tif
@@ -36,11 +38,13 @@ Exit codes:
   2  the server said no (the reason is printed)
   3  no server answered (is fathomd running? --server, $FATHOM_SERVER; behind
      TLS: --tls-ca, --tls-cert, --tls-key)
-  4  a file given is missing, damaged or not usable)";
+  4  a file given is missing, damaged or not usable
+  5  check: the trajectory meets an obstacle, or what counts as one
+  6  check: it meets none, but is not certain enough to be FREE)";
 
 int Report(const Session& session, const absl::Status& status) {
   const ExitCode code = ExitCodeOf(status);
-  if (code == ExitCode::kOk) return 0;
+  if (code == ExitCode::kOk) return static_cast<int>(session.exit_code);
   const std::string name = absl::StatusCodeToString(status.code());
   if (session.json) {
     nlohmann::ordered_json error;
@@ -92,6 +96,8 @@ int Main(int argc, char** argv) {
   AddMission(app, session);
   AddActivity(app, session);
   AddQuery(app, session);
+  AddCheck(app, session);
+  AddNearest(app, session);
   AddContacts(app, session);
   AddPrior(app, session);
   AddExport(app, session);

@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_format.h"
 #include "base/status_macros.h"
+#include "client/cli/answer_text.h"
 #include "client/cli/arguments.h"
 #include "client/cli/exit_code.h"
 #include "client/cli/points_file.h"
@@ -26,17 +27,6 @@ struct QueryFlags {
   std::optional<double> water_level_m;
 };
 
-v1::VerticalReference Reference(const QueryFlags& flags) {
-  v1::VerticalReference reference;
-  if (flags.water_level_m.has_value()) {
-    reference.set_reference(v1::DEPTH_REFERENCE_WATER_SURFACE);
-    reference.set_water_level_m(*flags.water_level_m);
-  } else {
-    reference.set_reference(v1::DEPTH_REFERENCE_MISSION_DATUM);
-  }
-  return reference;
-}
-
 std::string AnswerText(const QueryFlags& flags,
                        const v1::QueryObstacleRequest& question,
                        const v1::QueryObstacleResponse& response) {
@@ -47,40 +37,7 @@ std::string AnswerText(const QueryFlags& flags,
       StateText(answer.state()), 100 * flags.confidence, answer.probability(),
       PlaceText(question.position()), question.depth_m(), flags.clearance_m,
       flags.radius_m, question.has_time() ? TimeText(question.time()) : "now");
-  if (answer.has_seabed()) {
-    const v1::StaticEvidence& seabed = answer.seabed();
-    if (seabed.kind() == v1::EVIDENCE_KIND_LAND) {
-      text += "  seabed    land";
-    } else {
-      absl::StrAppendFormat(&text, "  seabed    %.2f m +- %.2f m, %s",
-                            seabed.depth_m(), seabed.std_m(),
-                            KindText(seabed.kind()));
-    }
-    const bool local = seabed.layer() == v1::MAP_LAYER_LOCAL;
-    absl::StrAppendFormat(
-        &text, ", %s map%s, %.4g m cell", local ? "local" : "global",
-        local ? " of " + seabed.activity_id() : "", seabed.cell_size_m());
-    if (seabed.has_age_s()) {
-      absl::StrAppendFormat(&text, ", %s old", SpanText(seabed.age_s()));
-    }
-    if (seabed.has_shoalest_m()) {
-      absl::StrAppendFormat(&text, "; shoalest sounding %.2f m",
-                            seabed.shoalest_m());
-    }
-    absl::StrAppendFormat(&text, "; P = %.6g\n", seabed.probability());
-  } else {
-    text += "  seabed    unknown: neither measured nor charted\n";
-  }
-  for (const v1::ContactEvidence& contact : answer.contacts()) {
-    absl::StrAppendFormat(
-        &text, "  contact   %s/%s: %.1f m away, reported %s before; P = %.6g\n",
-        contact.source_id(), contact.contact_id(), contact.distance_m(),
-        SpanText(contact.age_s()), contact.probability());
-  }
-  absl::StrAppendFormat(&text, "  map       revision %d, as of %s\n",
-                        response.stamp().map_revision(),
-                        TimeText(response.stamp().as_of()));
-  return text;
+  return text + ReasonsText(answer) + StampText(response.stamp());
 }
 
 absl::Status AskOne(const Session& session, const QueryFlags& flags,
@@ -92,7 +49,7 @@ absl::Status AskOne(const Session& session, const QueryFlags& flags,
         "--at needs --depth-m: how deep the vehicle would be there"));
   }
   request.set_depth_m(*flags.depth_m);
-  *request.mutable_vertical_reference() = Reference(flags);
+  *request.mutable_vertical_reference() = ReferenceOf(flags.water_level_m);
   if (time.has_value()) *request.mutable_time() = ToProto(*time);
   request.set_confidence(flags.confidence);
   request.set_vertical_clearance_m(flags.clearance_m);
@@ -115,7 +72,7 @@ absl::Status AskMany(const Session& session, const QueryFlags& flags,
       const std::vector<QuestionPoint> points,
       ReadPoints(flags.points_file, flags.depth_m, session.Now()));
   v1::QueryObstaclesRequest common;
-  *common.mutable_vertical_reference() = Reference(flags);
+  *common.mutable_vertical_reference() = ReferenceOf(flags.water_level_m);
   common.set_confidence(flags.confidence);
   common.set_vertical_clearance_m(flags.clearance_m);
   common.set_radius_m(flags.radius_m);

@@ -18,6 +18,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "base/time.h"
+#include "client/cli/exit_code.h"
 #include "client/client.h"
 
 namespace fathom::client::cli {
@@ -35,6 +36,8 @@ struct Session {
   std::string tls_key;
   // Set by the verb that the command line names.
   std::function<absl::Status()> run = nullptr;
+  // How the command ends if that went well.
+  ExitCode exit_code = ExitCode::kOk;
 
   // Errors: as Client::Connect; INVALID_ARGUMENT marked as the user's (a
   // certificate without its key) or NOT_FOUND as the file's.
@@ -58,6 +61,8 @@ void AddStatus(CLI::App& app, Session& session);
 void AddMission(CLI::App& app, Session& session);
 void AddActivity(CLI::App& app, Session& session);
 void AddQuery(CLI::App& app, Session& session);
+void AddCheck(CLI::App& app, Session& session);
+void AddNearest(CLI::App& app, Session& session);
 void AddContacts(CLI::App& app, Session& session);
 void AddPrior(CLI::App& app, Session& session);
 void AddExport(CLI::App& app, Session& session);

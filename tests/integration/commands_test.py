@@ -9,7 +9,7 @@ import unittest
 
 from live_server import (CREATE, DEADLINE_S, FATHOM, FEEDER, LiveTest, Server)
 
-OK, USAGE, REFUSED, UNREACHABLE, BAD_FILE = range(5)
+OK, USAGE, REFUSED, UNREACHABLE, BAD_FILE, CONFLICT, UNCERTAIN = range(7)
 ETOPO = pathlib.Path("/usr/share/ferret-vis/data/etopo5.cdf")
 
 
@@ -49,11 +49,11 @@ class Commands(LiveTest):
         cls.holder.doCleanups()
         assert exit_code == 0
 
-    def fathom(self, *arguments, code=OK, stdin=""):
+    def fathom(self, *arguments, code=OK, stdin="", said=True):
         done = run(FATHOM, *arguments, stdin=stdin, server=self.server)
         self.assertEqual(done.returncode, code, (arguments, done.stdout,
                                                  done.stderr))
-        if code != OK:
+        if code != OK and said:
             self.assertTrue(done.stderr, "a failure says why")
         return done.stdout
 
@@ -117,6 +117,65 @@ class Commands(LiveTest):
                           "OBSTACLE_STATE_OCCUPIED",
                           "OBSTACLE_STATE_UNKNOWN"])
         self.assertIsNone(document["answers"][2]["mean_depth_m"])
+
+    def test_nearest(self):
+        # The chart's southernmost row is land: up to 41.491 N, 111.06 km a
+        # degree: 1000 m south of 41.5 N.
+        arguments = ("nearest", "--at", "41.5,-71.4", "--depth-m", 10,
+                     "--unknown-is-free")
+        text, document = self.both(*arguments)
+        self.assertIn("OCCUPIED", text)
+        self.assertIn("land", text)
+        self.assertTrue(document["found"])
+        self.assertAlmostEqual(document["distance_m"], 999.5, delta=42)
+        self.assertAlmostEqual(document["bearing_deg"], 180, delta=1)
+        text, document = self.both(*arguments, "--radius-m", 900)
+        self.assertIn("nothing within 900 m", text)
+        self.assertFalse(document["found"])
+        # The chart ends 0.01 degree west and east: 835 m, give or take half
+        # a leaf of its 83 m cells.
+        document = json.loads(self.fathom(
+            "nearest", "--at", "41.5,-71.4", "--depth-m", 10, "--json"))
+        self.assertEqual(document["answer"]["state"],
+                         "OBSTACLE_STATE_UNKNOWN")
+        self.assertAlmostEqual(document["distance_m"], 835, delta=42)
+        self.fathom("nearest", "--at", "41.5", "--depth-m", 10, code=USAGE)
+        self.fathom("nearest", "--at", "41.5,-71.4", "--depth-m", 10,
+                    "--radius-m", 50001, code=REFUSED)
+
+    def test_check(self):
+        # South along 71.4 W from 41.5 N over 30 m +- 4 m of water to the
+        # land, which begins at 41.491 N: 1000 m.
+        plan = ("lat,lon,depth,time\n41.500,-71.4,10,now\n"
+                "41.495,-71.4,10,+5min\n41.4905,-71.4,10,+10min\n")
+        text = self.fathom("check", "-", stdin=plan, code=CONFLICT,
+                           said=False)
+        self.assertIn("first conflict on leg 1", text)
+        self.assertIn("land", text)
+        document = json.loads(self.fathom("check", "-", "--json", stdin=plan,
+                                          code=CONFLICT, said=False))
+        self.assertEqual(document["state"], "OBSTACLE_STATE_OCCUPIED")
+        self.assertEqual(document["first_conflict"]["leg_index"], 1)
+        self.assertEqual(len(document["legs"]), 2)
+        # GeoJSON at 2 m/s, 10 m deep: free. At 26 m P = Phi(-1) = 0.16.
+        line = {"type": "LineString",
+                "coordinates": [[-71.4, 41.5, -10], [-71.4, 41.499, -10]]}
+        text = self.fathom("check", "-", "--speed-m-s", 2,
+                           stdin=json.dumps(line))
+        self.assertIn("FREE", text)
+        for place in line["coordinates"]:
+            place[2] = -26
+        text = self.fathom("check", "-", "--speed-m-s", 2,
+                           stdin=json.dumps(line), code=UNCERTAIN, said=False)
+        self.assertIn("UNCERTAIN", text)
+        # Unknown water west of the chart, asked both ways.
+        away = "41.5,-71.45,5,now\n41.501,-71.45,5,+5min\n"
+        self.fathom("check", "-", stdin=away, code=CONFLICT, said=False)
+        self.fathom("check", "-", "--unknown-is-free", stdin=away)
+        self.fathom("check", "-", stdin="41.5,-71.45,5,now\n",
+                    code=BAD_FILE)
+        self.fathom("check", "-", "--radius-m", 1001, stdin=away,
+                    code=REFUSED)
 
     def test_activity(self):
         area = ("--south-west", "41.496,-71.404", "--size-m", 200)
