@@ -382,7 +382,11 @@ class Checker {
     const bool unknown = answer.state == ObstacleState::kUnknown;
     if (unknown && trajectory_.unknown_is_free) return;
     if (Badness(answer.state) > Badness(leg.state)) leg.state = answer.state;
-    if (!unknown && answer.state != ObstacleState::kOccupied) return;
+    const bool hazard =
+        answer.seabed.has_value() &&
+        ReachesHazard(answer.seabed->estimate,
+                      query_.depth_m + query_.vertical_clearance_m);
+    if (!unknown && !hazard && answer.state != ObstacleState::kOccupied) return;
     std::optional<Conflict>& first = verdict_.first_conflict;
     if (first.has_value() && first->time <= query_.time) return;
     first = {.leg = leg_index_,

@@ -82,15 +82,16 @@ class Search {
     return Counts(view_.SeabedAt(point));
   }
   bool Counts(const std::optional<SeabedEstimate>& seabed) const {
-    switch (Answer(query_, seabed, no_contacts_,
-                   {.ageing_rate_m2_s = view_.ageing_rate_m2_s()})
-                .state) {
+    const ObstacleAnswer answer =
+        Answer(query_, seabed, no_contacts_,
+               {.ageing_rate_m2_s = view_.ageing_rate_m2_s()});
+    switch (answer.state) {
       case ObstacleState::kOccupied:
         return true;
       case ObstacleState::kUnknown:
         return !question_.unknown_is_free;
       default:
-        return false;
+        return ReachesHazard(answer.seabed->estimate, solid_above_m_);
     }
   }
 

@@ -3,12 +3,14 @@
 //
 // What counts:
 //   - a place that is OCCUPIED by the seabed: P_static >= c at z + h;
+//   - a place with a point hazard (a rock narrower than its cell) at or above
+//     z + h, however small P is there;
 //   - a place that is UNKNOWN, unless unknown counts as free. Beyond the
 //     mission's square everything is, where no activity reaches;
 //   - a contact whose depths, widened by kDepthSigmas of their standard
 //     deviation, meet [z - h, z + h]: however uncertain its place, it is where
 //     it is predicted, a disc of its radius.
-// UNCERTAIN places do not count: ask with a lower confidence for those too.
+// Other UNCERTAIN places do not count: ask with a lower confidence for those.
 //
 // Places are the cells of the finest layers, each judged by what
 // ObstacleMapView::SeabedAt says of its middle, and as far away as their

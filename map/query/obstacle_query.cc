@@ -141,11 +141,10 @@ void AddContact(const ObstacleQuery& query, const Contact& contact,
 void Conclude(const ObstacleQuery& query, ObstacleAnswer& answer) {
   answer.state = ClassifyProbability(answer.probability, query.confidence,
                                      answer.seabed.has_value());
-  // False for a hazard that is NaN: none.
   const bool at_hazard =
       answer.seabed.has_value() &&
-      query.depth_m + query.vertical_clearance_m >=
-          static_cast<double>(answer.seabed->estimate.hazard_m);
+      ReachesHazard(answer.seabed->estimate,
+                    query.depth_m + query.vertical_clearance_m);
   if (at_hazard && answer.state == ObstacleState::kFree) {
     answer.state = ObstacleState::kUncertain;
   }
@@ -164,7 +163,7 @@ ObstacleAnswer Answer(const ObstacleQuery& query,
     reason.age_s = AgeS(seabed->estimate, query.time);
     reason.probability = StaticProbability(seabed->estimate, solid_above_m,
                                            reason.age_s.value_or(0.0), model);
-    if (solid_above_m >= static_cast<double>(seabed->estimate.hazard_m)) {
+    if (ReachesHazard(seabed->estimate, solid_above_m)) {
       reason.probability = std::max(reason.probability, kHazardShare);
     }
     answer.probability = reason.probability;

@@ -137,6 +137,12 @@ absl::Status ValidateQuery(const ObstacleQuery& query);
 double StaticProbability(const DepthEstimate& estimate, double solid_above_m,
                          double age_s, const QueryModel& model);
 
+// Whether solid_above_m = z + h is at or below a point hazard of the estimate.
+inline bool ReachesHazard(const DepthEstimate& estimate, double solid_above_m) {
+  // False for a hazard that is NaN: none.
+  return solid_above_m >= static_cast<double>(estimate.hazard_m);
+}
+
 // P_contact: that a contact, predicted to the query's time, is within its
 // radius
 // + query.radius_m of the place, from which its predicted position lies

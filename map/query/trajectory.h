@@ -69,15 +69,16 @@ struct LegVerdict {
   std::optional<double> least_clearance_m;
 };
 
-// The first place in time that is OCCUPIED, or UNKNOWN where that counts so.
+// The first place in time that is OCCUPIED, or UNKNOWN where that counts so, or
+// has a point hazard that the vehicle reaches, however small P is there.
 struct Conflict {
   std::uint32_t leg = 0;
   // The obstacle's: the middle of the cell, or the contact's predicted place.
   GeodeticPoint position;
   // The vehicle's depth when it is nearest.
   double depth_m = 0;
-  // When the swept disc first touches the cell; of a contact, when P first
-  // reaches c at one of the times looked at.
+  // When the swept disc first touches the cell, early by at most 0.21 of the
+  // cell's side; of a contact, when P first reaches c at a time looked at.
   Time time;
   ObstacleAnswer answer;
 };

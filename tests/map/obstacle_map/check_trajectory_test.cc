@@ -134,6 +134,24 @@ TEST(CheckTrajectory, TheSweptWidthReachesExactlySoFar) {
   EXPECT_EQ(state(250.09, 2), ObstacleState::kFree);
 }
 
+// One sounding of 20 m, 5 cm sure, may be on a rock's top: the hazard
+// begins 4.5 std above it, at 19.775 m, where P is small.
+TEST(CheckTrajectory, APointHazardIsAConflictThoughNotOccupied) {
+  ObstacleMap map(SmallMission());
+  ASSERT_TRUE(map.Import(FlatChart(60, 1), true).ok());
+  StartSurvey(map);
+  Sound(map, 255, 255, 20, 1);
+  const auto above =
+      Check(map, PathOf({At(100, 255, 19.77, 0), At(400, 255, 19.77, 150)}));
+  EXPECT_FALSE(above.first_conflict.has_value());
+  const auto at =
+      Check(map, PathOf({At(100, 255, 19.78, 0), At(400, 255, 19.78, 150)}));
+  EXPECT_EQ(at.state, ObstacleState::kUncertain);
+  EXPECT_LT(at.legs[0].worst_probability, 0.5);  // Far below 0.95.
+  ASSERT_TRUE(at.first_conflict.has_value());
+  EXPECT_EQ(at.first_conflict->answer.state, ObstacleState::kUncertain);
+}
+
 TEST(CheckTrajectory, UnknownWaterCountsAsAsked) {
   ObstacleMap map(SmallMission());
   Trajectory path = PathOf({At(0, 0, 5, 0), At(100, 0, 5, 50)});

@@ -72,10 +72,14 @@ class Oracle {
   bool Counts(const GeodeticPoint& point) const {
     ObstacleQuery query = question_.query;
     query.position = point;
-    const ObstacleState state =
-        Answer(query, view_.SeabedAt(point), ContactsView()).state;
-    return state == ObstacleState::kOccupied ||
-           (state == ObstacleState::kUnknown && !question_.unknown_is_free);
+    const ObstacleAnswer answer =
+        Answer(query, view_.SeabedAt(point), ContactsView());
+    return answer.state == ObstacleState::kOccupied ||
+           (answer.state == ObstacleState::kUnknown &&
+            !question_.unknown_is_free) ||
+           (answer.seabed.has_value() &&
+            query.depth_m + query.vertical_clearance_m >=
+                double{answer.seabed->estimate.hazard_m});
   }
   // A cell by its four sides: side(k, 0..1), one behind the other.
   void Add(const std::function<GeodeticPoint(int, double)>& side) {
@@ -214,8 +218,7 @@ TEST(FindNearest, EqualsASearchThroughEveryCell) {
     EXPECT_NEAR(nearest.distance_m, expected_m, 1e-4) << n;
     EXPECT_NEAR(DistanceM(question.query.position, nearest.position),
                 nearest.distance_m, 1e-6);
-    EXPECT_TRUE(nearest.answer.state == ObstacleState::kOccupied ||
-                nearest.answer.state == ObstacleState::kUnknown);
+    EXPECT_NE(nearest.answer.state, ObstacleState::kFree);
     if (nearest.distance_m == 0) {
       ++at_once;
       continue;
@@ -252,6 +255,21 @@ TEST(FindNearest, AWallIsFoundWithItsBearingAndReason) {
   NearestQuestion clearance = Question(Place(105, 205), 2, 5000);
   clearance.query.vertical_clearance_m = 2;
   EXPECT_TRUE(Find(map, clearance).has_value());
+}
+
+// One sounding of 20 m, 5 cm sure, may be on a rock's top: the hazard
+// begins 4.5 std above it, at 19.775 m, where P is small.
+TEST(FindNearest, APointHazardCountsThoughNotOccupied) {
+  ObstacleMap map(SmallMission());
+  ASSERT_TRUE(map.Import(FlatChart(60, 1), true).ok());
+  ASSERT_TRUE(map.Start(Survey("a", EstimatorKind::kAdaptive)).ok());
+  ASSERT_TRUE(map.ApplyPing(HitAt("a", 305, 405, 20, 0.05f, 1)).ok());
+  const auto nearest = Find(map, Question(Place(305, 205), 19.78, 1000));
+  ASSERT_TRUE(nearest.has_value());
+  EXPECT_NEAR(nearest->distance_m, 195, 0.01);
+  EXPECT_EQ(nearest->answer.state, ObstacleState::kUncertain);
+  EXPECT_LT(nearest->answer.probability, 0.5);  // Far below 0.95.
+  EXPECT_FALSE(Find(map, Question(Place(305, 205), 19.77, 1000)).has_value());
 }
 
 TEST(FindNearest, UnknownCountsUnlessItIsAskedForAsFree) {
