@@ -73,13 +73,13 @@ Consistency Measure(const Encounter& encounter, map::FilterKind filter) {
   const auto count = static_cast<double>(reports);
   double square_m2 = 0;
   Consistency result;
-  for (int set = 0; set < kSets; ++set) {
+  for (std::uint64_t set = 0; set < kSets; ++set) {
     std::vector<double> nees(reports);
     std::vector<double> nis(reports);
-    for (int run = 1; run <= kRuns; ++run) {
+    for (std::uint64_t run = 1; run <= kRuns; ++run) {
       map::ContactMap map(map::ContactMapOptions{.filter = filter});
       const std::vector<Moment> moments =
-          Run(encounter, static_cast<std::uint64_t>(set * kRuns + run));
+          Run(encounter, std::uint64_t{kRuns} * set + run);
       for (std::size_t i = 0; i < reports; ++i) {
         const map::ContactOutcome outcome = map.Apply(moments[i].report);
         result.gated += outcome.applied ? 0 : 1;

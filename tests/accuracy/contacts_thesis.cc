@@ -96,8 +96,8 @@ nlohmann::json ThesisContactFigures() {
         {"noise", noise},
         {"within_3std_percent", 100 * within / count},
         {"range_over_measured", std::sqrt(range_m2 / measured_m2)}};
-    for (const int minute : {1, 5, 15, 25}) {
-      const auto i = static_cast<std::size_t>(6 * minute);
+    for (const std::size_t minute : {1u, 5u, 15u, 25u}) {
+      const std::size_t i = 6 * minute;
       const std::string at = std::to_string(minute) + "_min";
       row["range_m_" + at] = rms(&Errors::range_m2, i);
       row["bearing_deg_" + at] = rms(&Errors::bearing_deg2, i);

@@ -114,7 +114,7 @@ class Run {
   // bad, for people; empty: nothing.
   std::string Play() {
     start_.CopyTo(folder_);
-    const std::string problem = Work();
+    std::string problem = Work();
     file_.reset();  // As a crash would, where Work gave up.
     Heal();
     if (!problem.empty()) return problem;
@@ -154,12 +154,12 @@ class Run {
     for (int i = 0; i < 5; ++i) {
       for (int k = 0; k < 3; ++k) script.Step();
       if (i == 2) script.Checkpointed();
-      const std::string problem = Commit(script.batch(), map);
+      std::string problem = Commit(script.batch(), map);
       if (!problem.empty() || stopped_) return problem;
       script.Committed();
       if (i == 1 || i == 3) file_->CopyLog().IgnoreError();
       if (i == 3) {
-        const std::string other = ReadAndCopy();
+        std::string other = ReadAndCopy();
         if (!other.empty()) return other;
       }
     }

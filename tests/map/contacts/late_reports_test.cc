@@ -143,7 +143,8 @@ TEST(LateReport, AnyOrderWithinTheWindowGivesTheSameTracks) {
     // to be gone must be known.
     std::vector<std::pair<double, std::size_t>> arrivals;
     for (std::size_t i = 0; i < reports.size(); ++i) {
-      arrivals.push_back({2.0 * static_cast<double>(i) + 25 * unit(random), i});
+      arrivals.emplace_back(2.0 * static_cast<double>(i) + 25 * unit(random),
+                            i);
     }
     arrivals[0].first = -1;
     std::sort(arrivals.begin(), arrivals.end());
