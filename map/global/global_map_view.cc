@@ -39,7 +39,8 @@ void VisitLeavesIn(const Tile& root, const CellKey& cell, const LatticeBox& box,
     return;
   }
   const Tile::Found found = Tile::Descend(root, row, col);
-  if (found.level <= cell.level) {
+  // No leaf is below kMaxLevel.
+  if (found.level <= cell.level || up == 0) {
     const int down = cell.level - found.level;
     visit({.level = static_cast<std::uint8_t>(found.level),
            .row = cell.row >> down,
