@@ -85,8 +85,7 @@ absl::Status MapKeeper::Stop() {
 // ---- Reading ----
 
 std::shared_ptr<const map::ObstacleMapView> MapKeeper::View() const {
-  MutexLock lock(view_mutex_);
-  return view_;
+  return views_.Get();
 }
 
 StorageState MapKeeper::storage_state() const {
@@ -449,14 +448,8 @@ void MapKeeper::ApplyContact(IngestMessage& message, MessageOutcome& outcome,
 
 MapKeeper::ViewPtr MapKeeper::Publish() {
   ViewPtr view = map_->View();
-  ViewPtr replaced = view;
-  {
-    MutexLock lock(view_mutex_);
-    view_.swap(replaced);
-  }
+  views_.Publish(view);
   gate_.Reach(view->revision());
-  // `replaced` may be the last reference to old pieces: freed here, outside
-  // the lock.
   return view;
 }
 

@@ -42,6 +42,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "base/mutex.h"
+#include "base/published.h"
 #include "base/time.h"
 #include "map/obstacle_map/obstacle_map.h"
 #include "server/ingest.h"
@@ -295,8 +296,8 @@ class MapKeeper {
   // As paced_from_, for commits.
   SteadyTime commit_paced_from_{};
 
-  mutable Mutex view_mutex_;
-  ViewPtr view_ FATHOM_GUARDED_BY(view_mutex_);
+  // Published by the mapper thread (and the constructor).
+  Published<map::ObstacleMapView> views_;
 
   mutable Mutex mutex_;
   CondVar queue_changed_;

@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "base/published.h"
 #include "map/contacts/contact_map.h"
 #include "map/contacts/filter.h"
 #include "map/obstacle_map/obstacle_map.h"
@@ -174,26 +175,35 @@ void BM_AnswerStatic(benchmark::State& state) {
 BENCHMARK(BM_AnswerStatic);
 
 // The same while a writer applies pings without pause and publishes a view
-// after every 64; the reader asks the newest.
+// after every 64; the reader asks the newest. /0: the writer writes this map.
+// /1: another of the same size, so that nothing is shared but the machine:
+// what a busy neighbour costs by itself.
 void BM_AnswerStaticBesideWriter(benchmark::State& state) {
   ObstacleMap map = WarmMission(0);
-  std::atomic<std::shared_ptr<const ObstacleMapView>> published(map.View());
+  ObstacleMap other = WarmMission(0);
+  Published<ObstacleMapView> published;
+  published.Publish(map.View());
+  Published<ObstacleMapView> unread;
+  const bool apart = state.range(0) == 1;
   std::atomic<bool> done = false;
   std::uint64_t pings = 0;
   std::thread writer([&] {
+    ObstacleMap& written = apart ? other : map;
+    Published<ObstacleMapView>& views = apart ? unread : published;
     for (int i = 0; !done; ++i) {
-      if (!map.ApplyPing(HitAt("a", 2.0 * (i % 250), 1.0 * ((37 * i) % 500), 20,
-                               1, 250 + i / 100))
+      if (!written
+               .ApplyPing(HitAt("a", 2.0 * (i % 250), 1.0 * ((37 * i) % 500),
+                                20, 1, 250 + i / 100))
                .ok()) {
         std::abort();
       }
-      if (++pings % 64 == 0) published = map.View();
+      if (++pings % 64 == 0) views.Publish(written.View());
     }
   });
   const std::vector<ObstacleQuery> queries = ScatteredQueries(500);
   std::size_t i = 0;
   for (auto _ : state) {
-    const std::shared_ptr<const ObstacleMapView> view = published;
+    const std::shared_ptr<const ObstacleMapView> view = published.Get();
     for (int n = 0; n < 64; ++n) {
       benchmark::DoNotOptimize(view->Answer(queries[i++ & 1023]));
     }
@@ -205,7 +215,7 @@ void BM_AnswerStaticBesideWriter(benchmark::State& state) {
       benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
   state.counters["pings"] = static_cast<double>(pings);
 }
-BENCHMARK(BM_AnswerStaticBesideWriter);
+BENCHMARK(BM_AnswerStaticBesideWriter)->Arg(0)->Arg(1)->UseRealTime();
 
 // The same with 10 000 contacts, none near.
 void BM_AnswerContactsFar(benchmark::State& state) {
