@@ -24,7 +24,9 @@ set(CMAKE_JOB_POOL_LINK link_pool)
 
 # Link this PUBLIC into a room's library: #include paths start at the root.
 add_library(fathom_includes INTERFACE)
-target_include_directories(fathom_includes INTERFACE ${PROJECT_SOURCE_DIR})
+target_include_directories(fathom_includes INTERFACE
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
+    $<INSTALL_INTERFACE:include/fathom>)
 
 # Link this PRIVATE into everything we wrote, never into generated code.
 add_library(fathom_warnings INTERFACE)
@@ -53,7 +55,7 @@ function(fathom_add_library name)
     add_library(${name} STATIC ${ARG_SOURCES})
     target_link_libraries(${name}
         PUBLIC fathom_includes ${ARG_PUBLIC}
-        PRIVATE fathom_warnings ${ARG_PRIVATE})
+        PRIVATE $<BUILD_INTERFACE:fathom_warnings> ${ARG_PRIVATE})
   else()
     add_library(${name} INTERFACE)
     target_link_libraries(${name}

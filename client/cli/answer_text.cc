@@ -5,17 +5,6 @@
 
 namespace fathom::client::cli {
 
-v1::VerticalReference ReferenceOf(std::optional<double> water_level_m) {
-  v1::VerticalReference reference;
-  if (water_level_m.has_value()) {
-    reference.set_reference(v1::DEPTH_REFERENCE_WATER_SURFACE);
-    reference.set_water_level_m(*water_level_m);
-  } else {
-    reference.set_reference(v1::DEPTH_REFERENCE_MISSION_DATUM);
-  }
-  return reference;
-}
-
 std::string ReasonsText(const v1::ObstacleAnswer& answer) {
   std::string text;
   if (answer.has_seabed()) {

@@ -3,16 +3,11 @@
 #ifndef FATHOM_CLIENT_CLI_ANSWER_TEXT_H_
 #define FATHOM_CLIENT_CLI_ANSWER_TEXT_H_
 
-#include <optional>
 #include <string>
 
 #include "fathom/v1/obstacle_service.pb.h"
 
 namespace fathom::client::cli {
-
-// What depths on the command line are from: the water surface, so high above
-// the mission's datum; absent: the datum itself.
-v1::VerticalReference ReferenceOf(std::optional<double> water_level_m);
 
 // One line for the seabed and one for each contact, each indented by two.
 std::string ReasonsText(const v1::ObstacleAnswer& answer);

@@ -9,6 +9,7 @@
 #include "client/cli/answer_text.h"
 #include "client/cli/arguments.h"
 #include "client/cli/exit_code.h"
+#include "client/cli/question_flags.h"
 #include "client/cli/session.h"
 #include "client/cli/text.h"
 #include "client/cli/trajectory_file.h"
@@ -22,13 +23,11 @@ struct CheckFlags {
   std::optional<double> depth_m;
   std::optional<double> speed_m_s;
   std::string start = "now";
-  double confidence = 0.95;
-  double clearance_m = 0;
+  QuestionFlags question;
   double radius_m = 0;
   double position_std_m = 0;
-  bool unknown_is_free = false;
+  v1::UnknownTreatment unknown = v1::UNKNOWN_TREATMENT_OCCUPIED;
   bool stop_at_first = false;
-  std::optional<double> water_level_m;
 };
 
 std::string LegsText(const v1::CheckTrajectoryResponse& response) {
@@ -49,7 +48,7 @@ std::string VerdictText(const CheckFlags& flags,
                         const v1::CheckTrajectoryResponse& response) {
   std::string text =
       absl::StrFormat("%s at %.4g %% confidence\n", StateText(response.state()),
-                      100 * flags.confidence);
+                      100 * flags.question.confidence);
   if (response.has_first_conflict()) {
     const v1::Conflict& conflict = response.first_conflict();
     absl::StrAppendFormat(
@@ -92,14 +91,10 @@ absl::Status Run(Session& session, const CheckFlags& flags) {
     waypoint->set_depth_m(point.depth_m);
     *waypoint->mutable_time() = ToProto(*point.time);
   }
-  *trajectory->mutable_vertical_reference() = ReferenceOf(flags.water_level_m);
+  SetQuestion(flags.question, *trajectory);
   trajectory->set_radius_m(flags.radius_m);
-  trajectory->set_vertical_clearance_m(flags.clearance_m);
   trajectory->set_position_std_m(flags.position_std_m);
-  trajectory->set_confidence(flags.confidence);
-  trajectory->set_treat_unknown_as(flags.unknown_is_free
-                                       ? v1::UNKNOWN_TREATMENT_FREE
-                                       : v1::UNKNOWN_TREATMENT_OCCUPIED);
+  trajectory->set_treat_unknown_as(flags.unknown);
   request.set_stop_at_first(flags.stop_at_first);
   FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<Client> client,
                           session.Connect());
@@ -135,27 +130,16 @@ void AddCheck(CLI::App& app, Session& session) {
                    "When the vehicle is at the first waypoint, if that has no "
                    "time: now, +10min, or 2026-01-01T12:00:00Z")
       ->capture_default_str();
-  verb->add_option("--confidence", f->confidence,
-                   "Certainty asked for, in (0.5, 1): OCCUPIED means P >= it, "
-                   "FREE means P <= 1 - it")
-      ->capture_default_str();
-  verb->add_option("--clearance-m", f->clearance_m,
-                   "Water to keep above the seabed and below keels, metres")
-      ->capture_default_str();
+  AddQuestionOptions(*verb, f->question);
   verb->add_option("--radius-m", f->radius_m, "Radius of the vehicle, metres")
       ->capture_default_str();
   verb->add_option("--position-std-m", f->position_std_m,
                    "How well the vehicle knows where it is: 1 sigma on each "
                    "axis, metres; widens what is looked at")
       ->capture_default_str();
-  verb->add_flag("--unknown-is-free", f->unknown_is_free,
-                 "Pass over places that were neither measured nor charted "
-                 "(default: they are conflicts)");
+  AddUnknownOption(*verb, f->unknown);
   verb->add_flag("--stop-at-first", f->stop_at_first,
                  "Do not look beyond the leg of the first conflict");
-  verb->add_option("--water-level-m", f->water_level_m,
-                   "Depths are from the water surface, which stands this high "
-                   "above the mission's datum, metres");
   verb->footer(
       "\nEvery cell of the map that the vehicle may touch is looked at, and "
       "every contact\nwhere it will be at the time. The state is the worst of "

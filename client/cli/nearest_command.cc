@@ -7,6 +7,7 @@
 #include "base/status_macros.h"
 #include "client/cli/answer_text.h"
 #include "client/cli/arguments.h"
+#include "client/cli/question_flags.h"
 #include "client/cli/session.h"
 #include "client/cli/text.h"
 #include "client/proto_time.h"
@@ -19,10 +20,8 @@ struct NearestFlags {
   double depth_m = 0;
   double radius_m = 5000;
   std::string time;
-  double confidence = 0.95;
-  double clearance_m = 0;
-  bool unknown_is_free = false;
-  std::optional<double> water_level_m;
+  QuestionFlags question;
+  v1::UnknownTreatment unknown = v1::UNKNOWN_TREATMENT_OCCUPIED;
 };
 
 std::string NearestText(const NearestFlags& flags,
@@ -30,7 +29,7 @@ std::string NearestText(const NearestFlags& flags,
   std::string text;
   if (!response.found()) {
     text = absl::StrFormat("nothing within %.4g m at %.4g %% confidence\n",
-                           flags.radius_m, 100 * flags.confidence);
+                           flags.radius_m, 100 * flags.question.confidence);
   } else {
     const v1::ObstacleAnswer& answer = response.answer();
     text = absl::StrFormat(
@@ -49,18 +48,14 @@ absl::Status Run(const Session& session, const NearestFlags& flags) {
   v1::FindNearestObstacleRequest request;
   FATHOM_ASSIGN_OR_RETURN(*request.mutable_position(), ParsePoint(flags.at));
   request.set_depth_m(flags.depth_m);
-  *request.mutable_vertical_reference() = ReferenceOf(flags.water_level_m);
+  SetQuestion(flags.question, request);
   if (!flags.time.empty()) {
     FATHOM_ASSIGN_OR_RETURN(const Time time,
                             ParseMoment(flags.time, session.Now()));
     *request.mutable_time() = ToProto(time);
   }
-  request.set_confidence(flags.confidence);
-  request.set_vertical_clearance_m(flags.clearance_m);
   request.set_search_radius_m(flags.radius_m);
-  request.set_treat_unknown_as(flags.unknown_is_free
-                                   ? v1::UNKNOWN_TREATMENT_FREE
-                                   : v1::UNKNOWN_TREATMENT_OCCUPIED);
+  request.set_treat_unknown_as(flags.unknown);
   FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<Client> client,
                           session.Connect());
   FATHOM_ASSIGN_OR_RETURN(const v1::FindNearestObstacleResponse response,
@@ -89,19 +84,8 @@ void AddNearest(CLI::App& app, Session& session) {
   verb->add_option("--time", f->time,
                    "When: now (default), +10min, or 2026-01-01T12:00:00Z; "
                    "contacts are where they will be then");
-  verb->add_option("--confidence", f->confidence,
-                   "Certainty asked for, in (0.5, 1): a place counts if "
-                   "P(obstacle) >= it")
-      ->capture_default_str();
-  verb->add_option("--clearance-m", f->clearance_m,
-                   "Water to keep above the seabed and below keels, metres")
-      ->capture_default_str();
-  verb->add_flag("--unknown-is-free", f->unknown_is_free,
-                 "Pass over places that were neither measured nor charted "
-                 "(default: they count as obstacles)");
-  verb->add_option("--water-level-m", f->water_level_m,
-                   "Depths are from the water surface, which stands this high "
-                   "above the mission's datum, metres");
+  AddQuestionOptions(*verb, f->question);
+  AddUnknownOption(*verb, f->unknown);
   verb->footer(
       "\nThe distance is to the nearest point of the cell of the map, or of "
       "the disc that\nholds the contact; 0: the place itself is not "

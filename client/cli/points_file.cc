@@ -13,7 +13,6 @@
 #include "client/cli/exit_code.h"
 #include "client/cli/session.h"
 #include "client/cli/text.h"
-#include "client/proto_time.h"
 
 namespace fathom::client::cli {
 namespace {
@@ -27,9 +26,6 @@ constexpr std::array<std::array<const char*, 3>, kColumns> kNames = {{
     {"depth_m", "depth", "z"},
     {"time", "time_utc", "timestamp"},
 }};
-
-// Points of one request to a server that states no limit.
-constexpr std::size_t kDefaultPart = 10'000;
 
 constexpr std::size_t kAbsent = static_cast<std::size_t>(-1);
 using Order = std::array<std::size_t, kColumns>;
@@ -121,11 +117,6 @@ nlohmann::ordered_json NumberOrNull(float value) {
   return value;
 }
 
-template <typename From, typename To>
-void AppendAll(const From& from, std::vector<To>& to) {
-  for (const auto& value : from) to.push_back(static_cast<To>(value));
-}
-
 }  // namespace
 
 absl::StatusOr<std::vector<QuestionPoint>> ReadPoints(
@@ -187,69 +178,6 @@ absl::StatusOr<std::vector<v1::GeodeticPoint>> ReadPlaces(
         absl::StrFormat("%s: %s", path, std::string(read.message())));
   }
   return places;
-}
-
-absl::StatusOr<PointAnswers> AskPoints(const Client& client,
-                                       const v1::QueryObstaclesRequest& common,
-                                       const std::vector<QuestionPoint>& points,
-                                       std::optional<Time> time) {
-  FATHOM_ASSIGN_OR_RETURN(const v1::GetMissionStatusResponse status,
-                          client.GetMissionStatus());
-  const auto limit =
-      static_cast<std::size_t>(status.limits().max_points_per_query());
-  const std::size_t part = limit > 0 ? limit : kDefaultPart;
-  const bool own_times = std::any_of(
-      points.begin(), points.end(),
-      [](const QuestionPoint& point) { return point.time.has_value(); });
-  // Offsets need a base; without one of the user's it is this machine's now.
-  std::optional<Time> base = time;
-  if (own_times && !base.has_value()) {
-    base = std::chrono::time_point_cast<Duration>(
-        std::chrono::system_clock::now());
-  }
-  PointAnswers answers;
-  for (std::size_t begin = 0; begin < points.size(); begin += part) {
-    v1::QueryObstaclesRequest request = common;
-    if (base.has_value()) *request.mutable_time() = ToProto(*base);
-    // Later parts read a map at least as new.
-    request.set_min_revision(answers.stamp.map_revision());
-    const std::size_t end = std::min(points.size(), begin + part);
-    for (std::size_t i = begin; i < end; ++i) {
-      request.add_latitude_deg(points[i].latitude_deg);
-      request.add_longitude_deg(points[i].longitude_deg);
-      request.add_depth_m(static_cast<float>(points[i].depth_m));
-      if (own_times) {
-        request.add_time_offset_us(
-            (points[i].time.value_or(*base) - *base).count());
-      }
-    }
-    FATHOM_ASSIGN_OR_RETURN(const v1::QueryObstaclesResponse response,
-                            client.QueryObstacles(request));
-    if (static_cast<std::size_t>(response.state_size()) != end - begin ||
-        response.probability_size() != response.state_size()) {
-      return absl::InternalError(
-          absl::StrFormat("%d answers came for %d questions",
-                          response.state_size(), end - begin));
-    }
-    AppendAll(response.probability(), answers.probability);
-    AppendAll(response.state(), answers.state);
-    AppendAll(response.mean_depth_m(), answers.mean_depth_m);
-    AppendAll(response.std_m(), answers.std_m);
-    AppendAll(response.age_s(), answers.age_s);
-    AppendAll(response.kind(), answers.kind);
-    if (begin == 0) answers.stamp = response.stamp();
-  }
-  // A server may leave reasons out; land has no depth.
-  answers.mean_depth_m.resize(points.size(), std::nanf(""));
-  answers.std_m.resize(points.size(), std::nanf(""));
-  answers.age_s.resize(points.size(), std::nanf(""));
-  answers.kind.resize(points.size(), v1::EVIDENCE_KIND_UNSPECIFIED);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (answers.kind[i] != v1::EVIDENCE_KIND_LAND) continue;
-    answers.mean_depth_m[i] = std::nanf("");
-    answers.std_m[i] = std::nanf("");
-  }
-  return answers;
 }
 
 nlohmann::ordered_json AnswersJson(const std::vector<QuestionPoint>& points,

@@ -9,6 +9,7 @@
 #include "client/cli/arguments.h"
 #include "client/cli/exit_code.h"
 #include "client/cli/points_file.h"
+#include "client/cli/question_flags.h"
 #include "client/cli/session.h"
 #include "client/cli/text.h"
 #include "client/proto_time.h"
@@ -21,10 +22,8 @@ struct QueryFlags {
   std::string points_file;
   std::optional<double> depth_m;
   std::string time;
-  double confidence = 0.95;
-  double clearance_m = 0;
+  QuestionFlags question;
   double radius_m = 0;
-  std::optional<double> water_level_m;
 };
 
 std::string AnswerText(const QueryFlags& flags,
@@ -34,9 +33,10 @@ std::string AnswerText(const QueryFlags& flags,
   std::string text = absl::StrFormat(
       "%s at %.4g %% confidence: P(obstacle) = %.6g\n"
       "  asked     %s, %.4g m deep, clearance %.4g m, radius %.4g m, %s\n",
-      StateText(answer.state()), 100 * flags.confidence, answer.probability(),
-      PlaceText(question.position()), question.depth_m(), flags.clearance_m,
-      flags.radius_m, question.has_time() ? TimeText(question.time()) : "now");
+      StateText(answer.state()), 100 * flags.question.confidence,
+      answer.probability(), PlaceText(question.position()), question.depth_m(),
+      flags.question.clearance_m, flags.radius_m,
+      question.has_time() ? TimeText(question.time()) : "now");
   return text + ReasonsText(answer) + StampText(response.stamp());
 }
 
@@ -49,10 +49,8 @@ absl::Status AskOne(const Session& session, const QueryFlags& flags,
         "--at needs --depth-m: how deep the vehicle would be there"));
   }
   request.set_depth_m(*flags.depth_m);
-  *request.mutable_vertical_reference() = ReferenceOf(flags.water_level_m);
+  SetQuestion(flags.question, request);
   if (time.has_value()) *request.mutable_time() = ToProto(*time);
-  request.set_confidence(flags.confidence);
-  request.set_vertical_clearance_m(flags.clearance_m);
   request.set_radius_m(flags.radius_m);
   FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<Client> client,
                           session.Connect());
@@ -72,9 +70,7 @@ absl::Status AskMany(const Session& session, const QueryFlags& flags,
       const std::vector<QuestionPoint> points,
       ReadPoints(flags.points_file, flags.depth_m, session.Now()));
   v1::QueryObstaclesRequest common;
-  *common.mutable_vertical_reference() = ReferenceOf(flags.water_level_m);
-  common.set_confidence(flags.confidence);
-  common.set_vertical_clearance_m(flags.clearance_m);
+  SetQuestion(flags.question, common);
   common.set_radius_m(flags.radius_m);
   common.set_with_reasons(true);
   FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<Client> client,
@@ -121,18 +117,9 @@ void AddQuery(CLI::App& app, Session& session) {
   verb->add_option("--time", f->time,
                    "When: now (default), +10min, --time=-30s, or "
                    "2026-01-01T12:00:00Z; past, present or future");
-  verb->add_option("--confidence", f->confidence,
-                   "Certainty asked for, in (0.5, 1): OCCUPIED means P >= it, "
-                   "FREE means P <= 1 - it")
-      ->capture_default_str();
-  verb->add_option("--clearance-m", f->clearance_m,
-                   "Water to keep above the seabed and below keels, metres")
-      ->capture_default_str();
+  AddQuestionOptions(*verb, f->question);
   verb->add_option("--radius-m", f->radius_m, "Radius of the vehicle, metres")
       ->capture_default_str();
-  verb->add_option("--water-level-m", f->water_level_m,
-                   "Depths are from the water surface, which stands this high "
-                   "above the mission's datum, metres");
   verb->footer(
       "\nThe answer is FREE, OCCUPIED, UNCERTAIN (P between) or UNKNOWN (no "
       "measurement\nand no chart there; never to be read as free).\n"

@@ -235,7 +235,12 @@ grpc::Status FakeServer::QueryObstacles(
   for (int i = 0; i < request->latitude_deg_size(); ++i) {
     response->add_probability(0.5f);
     response->add_state(v1::OBSTACLE_STATE_UNCERTAIN);
+    if (echo_latitude) {
+      response->add_mean_depth_m(static_cast<float>(request->latitude_deg(i)));
+    }
   }
+  if (echo_latitude) response->add_contacts()->set_point_index(0);
+  response->mutable_stamp()->set_map_revision(batch_revision);
   return Enter("QueryObstacles");
 }
 

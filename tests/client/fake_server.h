@@ -104,6 +104,10 @@ class FakeServer final : public v1::ObstacleService::Service,
   std::uint64_t tiles_held = 0;
   // Answered by GetMissionStatus.
   v1::GetMissionStatusResponse mission;
+  // QueryObstacles answers from this revision; with echo_latitude each mean
+  // depth is the point's latitude, and the first point has a contact.
+  std::uint64_t batch_revision = 0;
+  bool echo_latitude = false;
   // Requests as they came.
   v1::QueryObstacleRequest last_query;
   v1::QueryObstaclesRequest last_batch;
