@@ -26,7 +26,9 @@ namespace fathom::map {
 namespace {
 
 constexpr std::size_t kPings = 2048;
-constexpr std::size_t kPingsPerView = 64;
+// As often as the server publishes under full load (kMaxMessagesPerView of
+// server/limits.h): each view makes the writer copy what it writes next.
+constexpr std::size_t kPingsPerView = 256;
 
 LocalMapOptions Scene(EstimatorKind estimator) {
   LocalMapOptions options;
