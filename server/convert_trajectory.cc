@@ -1,7 +1,7 @@
 #include "server/convert_trajectory.h"
 
-#include <cmath>
 #include <cstddef>
+#include <optional>
 
 #include "absl/strings/str_format.h"
 #include "base/status_macros.h"
@@ -66,13 +66,6 @@ absl::StatusOr<map::Waypoint> ConvertWaypoint(const v1::Waypoint& waypoint,
   return out;
 }
 
-// Whether a leg is surely short: geodesics cost 1 us each, this nothing. Half
-// a degree both ways is at most 79 km.
-bool IsShort(const map::GeodeticPoint& a, const map::GeodeticPoint& b) {
-  return std::fabs(a.latitude_deg - b.latitude_deg) < 0.5 &&
-         std::fabs(a.longitude_deg - b.longitude_deg) < 0.5;
-}
-
 // The waypoint at `path` after the one before it.
 absl::Status CheckLeg(const map::Waypoint& before, const map::Waypoint& here,
                       const FieldPath& path) {
@@ -80,14 +73,14 @@ absl::Status CheckLeg(const map::Waypoint& before, const map::Waypoint& here,
     return InvalidField(FieldPath(path, "time").ToString(),
                         "is not later than that of the waypoint before");
   }
-  if (IsShort(before.position, here.position)) return absl::OkStatus();
-  const double length_m = map::DistanceM(before.position, here.position);
-  if (length_m <= map::kMaxLegM) return absl::OkStatus();
+  const std::optional<double> length_m =
+      map::TooLongLegM(before.position, here.position);
+  if (!length_m.has_value()) return absl::OkStatus();
   return InvalidField(
       FieldPath(path, "position").ToString(),
       absl::StrFormat("is %.0f m from the waypoint before; a leg may have "
                       "%.0f m: add waypoints between",
-                      length_m, map::kMaxLegM));
+                      *length_m, map::kMaxLegM));
 }
 
 }  // namespace

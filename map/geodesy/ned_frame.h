@@ -39,9 +39,9 @@ class NedFrame {
   // folds back and the result means nothing.
   NedPoint ToNed(const GeodeticPoint& point) const;
 
-  // Whether ToNed means something at the point and Contains-like questions may
-  // be put to it: within 10 degrees north or south and 60 east or west (any,
-  // near a pole), where nothing has folded back.
+  // Whether the point is near enough for ToNed to be one to one: within 10
+  // degrees of the origin's latitude and 60 of its longitude (any, near a
+  // pole), short of where the plane folds back.
   bool Covers(const GeodeticPoint& point) const;
 
   // The point of the ellipsoid that ToNed projects to (north_m, east_m): the

@@ -182,10 +182,9 @@ class Search {
   }
 
   void PushActivities() {
-    for (const auto& activity : view_.activities()) {
-      if (!activity->open()) continue;
+    for (const ActivityView* activity : view_.open_newest_first()) {
       const LocalMapView& local = *activity->local;
-      PushBlocks({.activity = activity.get(),
+      PushBlocks({.activity = activity,
                   .rows = (local.cells_north() + kBlockSide - 1) / kBlockSide,
                   .cols = (local.cells_east() + kBlockSide - 1) / kBlockSide});
     }
@@ -285,9 +284,9 @@ class Search {
   // there and the global map is deeper.
   bool MayCount(const Part& part) const {
     if (!question_.unknown_is_free) return true;
-    for (const auto& activity : view_.activities()) {
-      if (activity->open() && (activity.get() != part.activity ||
-                               activity->local->DefaultPrior().has_value())) {
+    for (const ActivityView* activity : view_.open_newest_first()) {
+      if (activity != part.activity ||
+          activity->local->DefaultPrior().has_value()) {
         return true;
       }
     }
@@ -363,8 +362,7 @@ class Search {
     if (root.cell_size_m(cell.level) > kPlaneReachM) return true;
     const std::array<GeodeticPoint, 4> corners = root.Corners(cell);
     const double slack_m = 1 + SlackM(root.cell_size_m(cell.level));
-    for (const auto& activity : view_.activities()) {
-      if (!activity->open()) continue;
+    for (const ActivityView* activity : view_.open_newest_first()) {
       const LocalMapView& local = *activity->local;
       if (DistanceM(local.frame().origin(), corners[0]) > 4 * kPlaneReachM) {
         continue;

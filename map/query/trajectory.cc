@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -36,25 +37,30 @@ absl::Status CheckWaypoint(const Trajectory& trajectory, std::size_t i) {
     return absl::InvalidArgumentError(absl::StrFormat(
         "%s.time must be after that of the waypoint before", name));
   }
-  // At most 63 km, and nearly every leg: not worth a geodesic.
-  constexpr double kNearDeg = 0.4;
-  if (std::fabs(here.position.latitude_deg - before.position.latitude_deg) <
-          kNearDeg &&
-      std::fabs(here.position.longitude_deg - before.position.longitude_deg) <
-          kNearDeg) {
-    return absl::OkStatus();
-  }
-  const double leg_m = DistanceM(before.position, here.position);
-  if (leg_m > kMaxLegM) {
+  if (const std::optional<double> leg_m =
+          TooLongLegM(before.position, here.position)) {
     return absl::InvalidArgumentError(
         absl::StrFormat("%s.position is %.0f m from the waypoint before; a leg "
                         "may be %.0f m: put waypoints between",
-                        name, leg_m, kMaxLegM));
+                        name, *leg_m, kMaxLegM));
   }
   return absl::OkStatus();
 }
 
 }  // namespace
+
+std::optional<double> TooLongLegM(const GeodeticPoint& a,
+                                  const GeodeticPoint& b) {
+  // At most 63 km, and nearly every leg: not worth a geodesic.
+  constexpr double kNearDeg = 0.4;
+  if (std::fabs(a.latitude_deg - b.latitude_deg) < kNearDeg &&
+      std::fabs(a.longitude_deg - b.longitude_deg) < kNearDeg) {
+    return std::nullopt;
+  }
+  const double leg_m = DistanceM(a, b);
+  if (leg_m <= kMaxLegM) return std::nullopt;
+  return leg_m;
+}
 
 double SweptHalfWidthM(const Trajectory& trajectory) {
   return trajectory.radius_m +

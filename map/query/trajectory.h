@@ -54,6 +54,11 @@ struct Trajectory {
 // The longest leg: a day at 1 m/s.
 inline constexpr double kMaxLegM = 100'000;
 
+// The length of a leg between two places, metres, if it is beyond kMaxLegM;
+// absent where the leg may be flown. Near places cost no geodesic.
+std::optional<double> TooLongLegM(const GeodeticPoint& a,
+                                  const GeodeticPoint& b);
+
 // w, metres.
 double SweptHalfWidthM(const Trajectory& trajectory);
 

@@ -398,6 +398,16 @@ TEST(CheckTrajectory, WorkIsBoundedAndCanBeStopped) {
             absl::StatusCode::kCancelled);
 }
 
+TEST(TooLongLegM, AcrossTheAntimeridianToo) {
+  // At the equator a degree of longitude is 111.319 km: 0.9 of it is the
+  // longest leg and a bit.
+  EXPECT_FALSE(TooLongLegM({0, 179.9}, {0, -179.9}).has_value());
+  EXPECT_FALSE(TooLongLegM({0, 0}, {0, 0.898}).has_value());
+  const std::optional<double> beyond = TooLongLegM({0, 179.5}, {0, -179.6});
+  ASSERT_TRUE(beyond.has_value());
+  EXPECT_NEAR(*beyond, 0.9 * 111'319.49, 1);
+}
+
 TEST(ValidateTrajectory, NamesWhatIsWrong) {
   const Trajectory good = PathOf({At(0, 0, 5, 0), At(100, 0, 5, 50)});
   EXPECT_TRUE(ValidateTrajectory(good).ok());
