@@ -1,41 +1,24 @@
 """Clients that share no code with us: @grpc/grpc-js, buf curl by reflection,
 and the README's first queries as they stand there."""
 
-import fcntl
 import json
 import os
 import pathlib
 import re
-import shutil
 import subprocess
 import sys
-import tempfile
 import textwrap
 import unittest
 
+import node_tools
 from live_server import (CREATE, DEADLINE_S, FATHOM, ROOT, LiveTest, Server,
                          import_chart)
+from node_tools import BUF, NODE
 
-NODE = ROOT / "tests" / "node"
-BUF = NODE / "node_modules" / ".bin" / "buf"
 ETOPO = pathlib.Path("/usr/share/ferret-vis/data/etopo5.cdf")
 
 
-def setUpModule():
-    """Installs the tools of tests/node where tests/run has not yet."""
-    missing = [name for name in ("node", "npm") if not shutil.which(name)]
-    if missing:
-        reason = f"not installed: {', '.join(missing)}"
-        print(f"skipped: {reason}", file=sys.stderr)
-        raise unittest.SkipTest(reason)
-    lock_path = pathlib.Path(tempfile.gettempdir()) / "fathom-npm-ci.lock"
-    with open(lock_path, "w", encoding="utf-8") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)  # Tests of two builds at once.
-        if not BUF.exists():
-            subprocess.run(
-                ["npm", "ci", "--prefix", NODE, "--ignore-scripts",
-                 "--no-audit", "--no-fund", "--no-progress",
-                 "--loglevel=error"], check=True, timeout=240)
+setUpModule = node_tools.install
 
 
 class GrpcJs(LiveTest):
