@@ -60,7 +60,7 @@ and answers "is there an obstacle at this place, time and confidence?".
     fathomd --mission bay.fathom
 
   Work on a mission file that no server holds (info, verify, digest, repair,
-  compact, export):
+  compact, export, import):
     fathomd mission verify bay.fathom
 
 When it serves, it prints one line on standard output:

@@ -16,14 +16,6 @@
 namespace fathom::server {
 namespace {
 
-// 128 random bits as 32 hexadecimal digits.
-std::string RandomId() {
-  std::random_device random;
-  std::string id;
-  for (int i = 0; i < 4; ++i) id += absl::StrFormat("%08x", random());
-  return id;
-}
-
 absl::StatusOr<map::RootSquare> MakeRoot(const NewMission& mission) {
   if (mission.center.has_value()) {
     if (mission.south_west.has_value() || mission.north_west.has_value()) {
@@ -54,6 +46,13 @@ absl::Status CheckRange(const char* flag, double value, double min,
 }
 
 }  // namespace
+
+std::string RandomMissionId() {
+  std::random_device random;
+  std::string id;
+  for (int i = 0; i < 4; ++i) id += absl::StrFormat("%08x", random());
+  return id;
+}
 
 absl::StatusOr<map::GeodeticPoint> ParsePoint(std::string_view text) {
   const std::vector<std::string> parts = absl::StrSplit(std::string(text), ',');
@@ -88,7 +87,7 @@ absl::StatusOr<std::unique_ptr<storage::MissionFile>> CreateMission(
   }
   FATHOM_ASSIGN_OR_RETURN(const map::RootSquare root, MakeRoot(mission));
   return storage::MissionFile::Create(
-      path, {.mission_id = RandomId(),
+      path, {.mission_id = RandomMissionId(),
              .name = mission.name,
              .vertical_datum = mission.vertical_datum,
              .created = now,

@@ -36,6 +36,9 @@ struct NewMission {
   double ageing_rate_m2_s = 0;
 };
 
+// 128 random bits as 32 hexadecimal digits.
+std::string RandomMissionId();
+
 // "41.5,-71.4" in degrees. Errors: INVALID_ARGUMENT.
 absl::StatusOr<map::GeodeticPoint> ParsePoint(std::string_view text);
 

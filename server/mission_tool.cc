@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,9 +11,11 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_format.h"
+#include "base/clock.h"
 #include "base/status_macros.h"
 #include "google/protobuf/struct.pb.h"
 #include "google/protobuf/util/json_util.h"
+#include "server/mission.h"
 #include "storage/offline.h"
 
 namespace fathom::server {
@@ -141,6 +144,34 @@ absl::Status Compact(const std::string& path, Result& out) {
   return absl::OkStatus();
 }
 
+struct ImportFlags {
+  bool create = false;
+  bool as_chart = false;
+  std::optional<double> ageing_m2_per_day;
+};
+
+absl::Status ImportInto(const std::string& from, const std::string& into,
+                        const ImportFlags& flags, Result& out) {
+  storage::ImportOptions options;
+  options.now = SystemClock().Now();
+  options.as_chart = flags.as_chart;
+  if (flags.ageing_m2_per_day) {
+    options.ageing_m2_s = *flags.ageing_m2_per_day / 86'400;
+  }
+  if (flags.create) options.create = RandomMissionId();
+  FATHOM_ASSIGN_OR_RETURN(const storage::Import import,
+                          storage::ImportMission(from, into, options));
+  out.Text("map_digest", import.digest);
+  out.Count("map_revision", import.revision);
+  out.Count("leaves_before", import.merge.leaves_before);
+  out.Count("leaves_written", import.merge.leaves_written);
+  out.Count("leaves_kept", import.merge.leaves_kept);
+  out.Count("leaves_after", import.merge.leaves_after);
+  if (!import.backup.empty()) out.Text("backup", import.backup);
+  out.List("left_out", import.left_out);
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 int MissionToolMain(int argc, char** argv) {
@@ -159,6 +190,7 @@ int MissionToolMain(int argc, char** argv) {
     if (writes) verb->add_option("OUT", to, "The new file")->required();
     verb->add_flag("--json", json, "One JSON document");
     verb->callback([&run, job = std::move(job)] { run = job; });
+    return verb;
   };
   add("info", "What it is and holds", false,
       [&] { return Info(path, result); });
@@ -172,19 +204,38 @@ int MissionToolMain(int argc, char** argv) {
       [&] { return ExportTo(path, to, result); });
   add("compact", "Rewrite it without free pages, in place", false,
       [&] { return Compact(path, result); });
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kExitMisuse;
-  }
-  const absl::Status status = run();
-  if (status.ok() || status.message().empty()) result.Print(json);
-  if (status.ok()) return 0;
-  if (!status.message().empty()) {
-    absl::FPrintF(stderr, "fathomd mission: %s\n",
-                  std::string(status.message()));
-  }
-  return absl::IsDataLoss(status) ? kExitDamaged : kExitFailed;
+  ImportFlags flags;
+  CLI::App* import = app.add_subcommand(
+      "import", "Merge the map of another mission into this one");
+  import->add_option("FROM", to, "The other mission")->required();
+  import->add_option("INTO", path, "The mission that takes it")->required();
+  import->add_flag("--create", flags.create,
+                   "Make INTO: a new mission with the square of FROM");
+  import->add_flag(
+      "--as-chart", flags.as_chart,
+      "As a-priori depths, not as measurements: may share evidence "
+      "with INTO, fills only what is unknown there");
+  import->add_option("--ageing-m2-per-day", flags.ageing_m2_per_day,
+                     "Variance that a depth gained per day of its age; by "
+                     "default that of FROM");
+  import->add_flag("--json", json, "One JSON document");
+  import->callback([&] {
+    run = [&] { return ImportInto(to, path, flags, result);
+};
+}  // namespace fathom::server
+);
+try {
+  app.parse(argc, argv);
+} catch (const CLI::ParseError& error) {
+  return app.exit(error) == 0 ? 0 : kExitMisuse;
+}
+const absl::Status status = run();
+if (status.ok() || status.message().empty()) result.Print(json);
+if (status.ok()) return 0;
+if (!status.message().empty()) {
+  absl::FPrintF(stderr, "fathomd mission: %s\n", std::string(status.message()));
+}
+return absl::IsDataLoss(status) ? kExitDamaged : kExitFailed;
 }
 
 }  // namespace fathom::server

@@ -1,7 +1,12 @@
 #include "storage/offline.h"
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <limits>
 #include <memory>
+#include <set>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -89,6 +94,149 @@ absl::Status CopyHistory(Connection& from, MissionFile& to, Repair& repair) {
   }
 }
 
+// Half a file is worse than none.
+void RemoveMission(const std::string& path) {
+  std::error_code ignored;
+  for (const char* end : {"", "-wal", "-shm"}) {
+    std::filesystem::remove(path + end, ignored);
+  }
+}
+
+// Positions of this kind say which missions were merged into one.
+constexpr std::string_view kMissionPrefix = "mission:";
+
+// The missions whose evidence is in one.
+std::set<std::string> Ancestors(const Loaded& loaded) {
+  std::set<std::string> ids = {loaded.metadata.mission_id};
+  for (const SourcePosition& position : loaded.source_positions) {
+    const std::string& source = position.source.value;
+    if (position.stream == StreamKind::kImports &&
+        source.starts_with(kMissionPrefix)) {
+      ids.insert(source.substr(kMissionPrefix.size()));
+    }
+  }
+  return ids;
+}
+
+// What is merged: the other mission's map with every activity completed.
+struct OtherMission {
+  MissionMetadata metadata;
+  std::set<std::string> ancestors;
+  std::shared_ptr<const map::ObstacleMapView> view;
+  std::vector<std::string> damage;
+};
+
+absl::StatusOr<OtherMission> ReadOther(const std::string& path) {
+  FATHOM_ASSIGN_OR_RETURN(ReadMission mission, OpenToRead(path));
+  FATHOM_ASSIGN_OR_RETURN(Loaded loaded, LoadMission(mission.connection));
+  OtherMission other{.metadata = loaded.metadata,
+                     .ancestors = Ancestors(loaded),
+                     .view = nullptr,
+                     .damage = loaded.damage};
+  FATHOM_ASSIGN_OR_RETURN(const map::MissionOptions options,
+                          OptionsOf(loaded.metadata));
+  FATHOM_ASSIGN_OR_RETURN(const RestoredMap restored,
+                          RestoreMap(std::move(loaded), options));
+  other.view = restored.map->View();
+  for (const auto& activity : other.view->activities()) {
+    if (!activity->open()) continue;
+    FATHOM_RETURN_IF_ERROR(
+        restored.map->Complete(activity->id, /*discard=*/false).status());
+  }
+  other.view = restored.map->View();
+  return other;
+}
+
+absl::Status CheckUnrelated(const OtherMission& other, const Loaded& into) {
+  const std::string& id = other.metadata.mission_id;
+  for (const std::string& held : Ancestors(into)) {
+    if (!other.ancestors.contains(held)) continue;
+    if (held == into.metadata.mission_id) {
+      return absl::FailedPreconditionError(absl::StrFormat(
+          "mission_id=%s is or holds the mission that it is to be merged into; "
+          "its evidence would count twice (as a chart it may come)",
+          id));
+    }
+    return absl::AlreadyExistsError(absl::StrFormat(
+        "evidence of mission_id=%s is there already and would count twice (as "
+        "a chart it may come)",
+        held));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckFits(const OtherMission& other, const MissionMetadata& into,
+                       const ImportOptions& options) {
+  if (options.ageing_m2_s.has_value() &&
+      !(*options.ageing_m2_s >= 0 && std::isfinite(*options.ageing_m2_s))) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "ageing_m2_s=%g must be finite and >= 0", *options.ageing_m2_s));
+  }
+  if (other.metadata.vertical_datum != into.vertical_datum) {
+    return absl::FailedPreconditionError(absl::StrFormat(
+        "its depths are below vertical_datum=%s, those of this mission below "
+        "%s; export it, shift it, and import it as a chart",
+        other.metadata.vertical_datum, into.vertical_datum));
+  }
+  return absl::OkStatus();
+}
+
+// Unix seconds within what a leaf can hold.
+std::uint32_t LeafSeconds(Time time) {
+  return static_cast<std::uint32_t>(
+      std::clamp<std::int64_t>(ToUnixMicros(time) / 1'000'000, 0,
+                               std::numeric_limits<std::uint32_t>::max()));
+}
+
+absl::StatusOr<Import> MergeInto(const OtherMission& other, MissionFile& file,
+                                 const ImportOptions& options) {
+  FATHOM_RETURN_IF_ERROR(CheckFits(other, file.metadata(), options));
+  FATHOM_ASSIGN_OR_RETURN(Loaded loaded, file.Load());
+  Import import;
+  import.left_out = other.damage;
+  Batch batch;
+  if (!options.as_chart) {
+    FATHOM_RETURN_IF_ERROR(CheckUnrelated(other, loaded));
+    for (const std::string& id : other.ancestors) {
+      batch.source_positions.push_back(
+          {.stream = StreamKind::kImports,
+           .source = {std::string(kMissionPrefix) + id},
+           .epoch = 1,
+           .sequence = std::max<std::uint64_t>(1, other.view->revision())});
+    }
+  }
+  const double rate_m2_s = loaded.metadata.ageing_rate_m2_s;
+  FATHOM_ASSIGN_OR_RETURN(const map::MissionOptions map_options,
+                          OptionsOf(loaded.metadata));
+  FATHOM_ASSIGN_OR_RETURN(const RestoredMap restored,
+                          RestoreMap(std::move(loaded), map_options));
+  const std::uint64_t revision_before = restored.map->revision();
+  FATHOM_ASSIGN_OR_RETURN(
+      import.merge,
+      restored.map->MergeMap(
+          other.view->global(), other.view->as_of(),
+          {.widening_m2_s = std::max(0.0, options.ageing_m2_s.value_or(
+                                              other.metadata.ageing_rate_m2_s) -
+                                              rate_m2_s),
+           .now_s = LeafSeconds(options.now),
+           .unknown_time_s = LeafSeconds(other.metadata.created),
+           .as_chart = options.as_chart}));
+  if (!options.create.has_value()) {
+    import.backup = absl::StrFormat("%s.r%d.bak", file.path(), revision_before);
+    const auto saved = file.SaveCopy(import.backup);
+    // One that is there is of an earlier try.
+    if (!saved.ok() && !absl::IsAlreadyExists(saved.status())) {
+      return saved.status();
+    }
+  }
+  const auto view = restored.map->View();
+  batch.checkpoint = Checkpoint{.now = view, .previous = restored.checkpoint};
+  FATHOM_RETURN_IF_ERROR(file.Commit(batch));
+  import.revision = view->revision();
+  import.digest = view->Digest();
+  return import;
+}
+
 }  // namespace
 
 absl::StatusOr<MissionInfo> ReadInfo(const std::string& path) {
@@ -157,11 +305,7 @@ absl::StatusOr<Repair> RepairMission(const std::string& path,
   const absl::Status closed = file->Close();
   if (status.ok()) status = closed;
   if (status.ok()) return repair;
-  // Half a repair is worse than none.
-  std::error_code ignored;
-  for (const char* end : {"", "-wal", "-shm"}) {
-    std::filesystem::remove(out + end, ignored);
-  }
+  RemoveMission(out);
   return status;
 }
 
@@ -184,6 +328,29 @@ absl::StatusOr<std::uint64_t> CompactMission(const std::string& path) {
     connection.CheckpointOnClose();
   }
   return SizeOf(path);
+}
+
+absl::StatusOr<Import> ImportMission(const std::string& from,
+                                     const std::string& into,
+                                     const ImportOptions& options) {
+  FATHOM_ASSIGN_OR_RETURN(const OtherMission other, ReadOther(from));
+  if (!options.create.has_value()) {
+    FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<MissionFile> file,
+                            MissionFile::Open(into));
+    FATHOM_ASSIGN_OR_RETURN(Import import, MergeInto(other, *file, options));
+    FATHOM_RETURN_IF_ERROR(file->Close());
+    return import;
+  }
+  MissionMetadata metadata = other.metadata;
+  metadata.mission_id = *options.create;
+  metadata.created = options.now;
+  FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<MissionFile> file,
+                          MissionFile::Create(into, metadata));
+  absl::StatusOr<Import> import = MergeInto(other, *file, options);
+  const absl::Status closed = file->Close();
+  if (import.ok() && !closed.ok()) import = closed;
+  if (!import.ok()) RemoveMission(into);
+  return import;
 }
 
 }  // namespace fathom::storage

@@ -124,6 +124,40 @@ void AddFileVerb(CLI::App& mission, Session& session, const std::string& name,
   });
 }
 
+// `fathom mission import FROM INTO`; fathomd knows the flags' meaning.
+void AddImport(CLI::App& mission, Session& session) {
+  CLI::App* verb = mission.add_subcommand(
+      "import", "Merge the map of another mission's file into one");
+  const auto arguments = std::make_shared<std::vector<std::string>>();
+  verb->add_option("FILES", *arguments, "The other mission, and who takes it")
+      ->required()
+      ->expected(2)
+      ->type_name("FROM INTO");
+  const auto ageing = std::make_shared<std::string>();
+  const auto create = std::make_shared<bool>(false);
+  const auto as_chart = std::make_shared<bool>(false);
+  verb->add_flag("--create", *create,
+                 "Make INTO: a new mission with the square of FROM");
+  verb->add_flag("--as-chart", *as_chart,
+                 "As a-priori depths, not as measurements: may share evidence "
+                 "with INTO, fills only what is unknown there");
+  verb->add_option("--ageing-m2-per-day", *ageing,
+                   "Variance that a depth gained per day of its age; by "
+                   "default that of FROM");
+  verb->callback([&session, arguments, ageing, create, as_chart]() {
+    session.run = [&session, arguments, ageing, create, as_chart]() {
+      std::vector<std::string> all = {"import"};
+      all.insert(all.end(), arguments->begin(), arguments->end());
+      if (*create) all.push_back("--create");
+      if (*as_chart) all.push_back("--as-chart");
+      if (!ageing->empty()) {
+        all.insert(all.end(), {"--ageing-m2-per-day", *ageing});
+      }
+      return WorkOnMissionFile(session, all);
+    };
+  });
+}
+
 }  // namespace
 
 void AddMission(CLI::App& app, Session& session) {
@@ -135,7 +169,8 @@ void AddMission(CLI::App& app, Session& session) {
       "  fathom mission save before-dive.fathom\n"
       "  fathom mission verify --json\n"
       "  fathom mission verify --file old.fathom\n"
-      "  fathom mission export old.fathom tracks.gpkg");
+      "  fathom mission export old.fathom tracks.gpkg\n"
+      "  fathom mission import other.fathom mine.fathom");
 
   const auto file = std::make_shared<std::string>();
   const auto add_file = [&file](CLI::App* to) {
@@ -180,6 +215,7 @@ void AddMission(CLI::App& app, Session& session) {
   AddFileVerb(*verb, session, "export",
               "A file's contact history as a GeoPackage, for GDAL and QGIS",
               true);
+  AddImport(*verb, session);
 }
 
 }  // namespace fathom::client::cli

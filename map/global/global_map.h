@@ -171,6 +171,31 @@ class GlobalMap {
   // About 0.3 us a leaf.
   absl::StatusOr<ImportSummary> ImportRaster(const RasterBlock& block);
 
+  // How MergeMap takes what another map holds.
+  struct MapMergeOptions {
+    // Variance that a depth gains for each second of its evidence's age at
+    // `now_s`, m^2/s, >= 0.
+    double widening_m2_s = 0;
+    // Unix seconds; the second stands for times that are not known.
+    std::uint32_t now_s = 0;
+    std::uint32_t unknown_time_s = 0;
+    // Whether its measured leaves come as charted ones.
+    bool as_chart = false;
+  };
+
+  // Takes over what another mission's map holds. But for a chart it is evidence
+  // of its own: it must share none with this map. Measured leaves are fused as in MergeArea;
+  // charted ones fill only what is unknown here, for both may come from one
+  // chart (land also replaces charted depths). Times, hazards and residuals
+  // stay. In the same square (bit-identical corners) leaves meet leaves: into
+  // an empty map with as fine cells the same leaves come, bit for bit. In
+  // another square each cell of ours takes four or more points' answers by
+  // moments, so that no leaf is missed; a shore in a measured cell is a hazard.
+  // What lies outside our square is left out. If `degraded` is not 0 the map
+  // is to be thrown away: max_cells was reached. About 3 us a leaf.
+  WriteSummary MergeMap(const GlobalMapView& other,
+                        const MapMergeOptions& options);
+
   // Merges siblings that agree, from the leaves up, over the whole map (fig.
   // 4-18); tiles that did not change since the last time are not opened.
   // Kinds never mix: unknown merges with unknown, land with land; nor do leaves

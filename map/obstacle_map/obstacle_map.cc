@@ -304,6 +304,27 @@ absl::StatusOr<ImportResult> ObstacleMap::Import(const RasterBlock& block,
   return result;
 }
 
+absl::StatusOr<MergeResult> ObstacleMap::MergeMap(
+    const GlobalMapView& other, Time other_as_of,
+    const GlobalMap::MapMergeOptions& options) {
+  MergeResult result;
+  result.leaves_before = global_view_.known_leaf_count();
+  const GlobalMap::WriteSummary written = global_.MergeMap(other, options);
+  if (written.degraded > 0) {
+    return absl::ResourceExhaustedError(absl::StrFormat(
+        "max_cells=%u is too small for both maps: %u cells found no leaf of "
+        "their size",
+        options_.global.max_cells, written.degraded));
+  }
+  result.leaves_written = written.leaves_written;
+  result.leaves_kept = written.kept_measured;
+  global_.Conglomerate(MergeRule::kRange, OpenAreas(nullptr));
+  global_view_ = global_.View();
+  result.leaves_after = global_view_.known_leaf_count();
+  Advance(other_as_of);
+  return result;
+}
+
 std::shared_ptr<const ObstacleMapView> ObstacleMap::View() {
   for (auto& [id, open] : open_) {
     if (open.changed) {

@@ -72,6 +72,15 @@ struct ImportResult {
   uint64_t leaves_after = 0;
 };
 
+// What merging another mission's map did.
+struct MergeResult {
+  uint64_t leaves_written = 0;
+  // Places where what was here stayed: measured under a chart.
+  uint64_t leaves_kept = 0;
+  uint64_t leaves_before = 0;
+  uint64_t leaves_after = 0;
+};
+
 // An activity as stored; blocks follow by RestoreBlock.
 struct StoredActivity {
   StartActivity start;
@@ -116,6 +125,15 @@ class ObstacleMap {
   // Loads one block of an a-priori chart (section 4.4.3); `last` conglomerates
   // the global map behind it. Errors: INVALID_ARGUMENT (sizes, steps).
   absl::StatusOr<ImportResult> Import(const RasterBlock& block, bool last);
+
+  // Takes over the global map of another mission (GlobalMap::MergeMap) and
+  // conglomerates. Its open activities must have been completed, its contacts
+  // are not taken. `other_as_of` is the time of its newest evidence. Errors:
+  // RESOURCE_EXHAUSTED (max_cells is too small for both; this map is then to be
+  // thrown away).
+  absl::StatusOr<MergeResult> MergeMap(
+      const GlobalMapView& other, Time other_as_of,
+      const GlobalMap::MapMergeOptions& options);
 
   uint64_t revision() const { return revision_; }
 

@@ -117,6 +117,30 @@ class MissionFiles(LiveTest):
         self.assertEqual(repair["map_digest"], self.digest)
         self.assertEqual(self.verb("verify", fixed)["map_digest"], self.digest)
 
+    def test_another_missions_map_is_merged_and_served(self):
+        # A new mission from the saved map; it knows what that one knew.
+        new = self.folder / "new.fathom"
+        done = run(FATHOM, "--json", "mission", "import", self.path, new,
+                   "--create")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        merged = json.loads(done.stdout)
+        self.assertGreater(merged["leaves_after"], 0)
+        with self.reopen("new.fathom") as server:
+            self.assertEqual(server.status(digest=True).map_digest,
+                             merged["map_digest"])
+            self.assertEqual(len(server.status().activities), 0)
+        # Not twice; as a chart it may, and says nothing new.
+        again = run(FATHOMD, "mission", "import", self.path, new)
+        self.assertEqual(again.returncode, 1)
+        self.assertIn("would count twice", again.stderr)
+        chart = self.verb("import", self.path, new, "--as-chart",
+                          "--ageing-m2-per-day", "0.5")
+        self.assertEqual(chart["leaves_after"], chart["leaves_before"])
+        self.assertEqual(self.verb("verify", chart["backup"])["map_digest"],
+                         merged["map_digest"])
+        self.assertEqual(self.verb("verify", self.path)["map_digest"],
+                         self.digest)
+
     def test_contact_history_opens_in_gdal_as_points_and_lines(self):
         out = self.folder / "tracks.gpkg"
         self.assertEqual(self.verb("export", self.path, out),
