@@ -184,15 +184,15 @@ class GlobalMap {
   };
 
   // Takes over what another mission's map holds. But for a chart it is evidence
-  // of its own: it must share none with this map. Measured leaves are fused as in MergeArea;
-  // charted ones fill only what is unknown here, for both may come from one
-  // chart (land also replaces charted depths). Times, hazards and residuals
-  // stay. In the same square (bit-identical corners) leaves meet leaves: into
-  // an empty map with as fine cells the same leaves come, bit for bit. In
-  // another square each cell of ours takes four or more points' answers by
-  // moments, so that no leaf is missed; a shore in a measured cell is a hazard.
-  // What lies outside our square is left out. If `degraded` is not 0 the map
-  // is to be thrown away: max_cells was reached. About 3 us a leaf.
+  // of its own: it must share none with this map. Measured leaves are fused as
+  // in MergeArea; charted ones fill only what is unknown here, for both may
+  // come from one chart (land also replaces charted depths). Times, hazards and
+  // residuals stay. In the same square (bit-identical corners) leaves meet
+  // leaves: into an empty map with as fine cells the same leaves come, bit for
+  // bit. In another square each cell of ours takes four or more points' answers
+  // by moments, so that no leaf is missed; a shore in a measured cell is a
+  // hazard. What lies outside our square is left out. If `degraded` is not 0
+  // the map is to be thrown away: max_cells was reached. About 3 us a leaf.
   WriteSummary MergeMap(const GlobalMapView& other,
                         const MapMergeOptions& options);
 
