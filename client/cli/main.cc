@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <exception>
 
+#include "client/cli/completion.h"
 #include "client/cli/exit_code.h"
 #include "client/cli/session.h"
 #include "client/errors.h"
@@ -102,6 +103,15 @@ int Main(int argc, char** argv) {
   AddPrior(app, session);
   AddExport(app, session);
   AddRender(app, session);
+  app.add_subcommand("completion",
+                     "Print the completion script for bash: source <(fathom "
+                     "completion)")
+      ->callback([&session, &app]() {
+        session.run = [&app]() {
+          Print(BashCompletion(app));
+          return absl::OkStatus();
+        };
+      });
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
