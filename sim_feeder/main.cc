@@ -14,6 +14,7 @@
 #include "base/time.h"
 #include "sim_feeder/evaluate_command.h"
 #include "sim_feeder/questions_command.h"
+#include "sim_feeder/replay/replay_command.h"
 #include "sim_feeder/run_command.h"
 
 namespace fathom::feeder {
@@ -110,9 +111,9 @@ CLI::Option* AddArea(CLI::App& app, SurveyArea& area) {
   return corner;
 }
 
-void AddActivity(CLI::App& app, RunOptions& run) {
-  app.add_option("--activity", run.scenario.activity_id, "Activity id")
-      ->required();
+// Of `run` and `replay` both.
+template <typename Options>
+void AddActivity(CLI::App& app, Options& run) {
   app.add_option("--vehicle", run.vehicle_id, "Vehicle id of the activity");
   app.add_flag("!--no-start", run.start_activity,
                "The activity is open already: do not start it");
@@ -195,6 +196,8 @@ CLI::App* AddRun(CLI::App& app, RunOptions& run) {
       ->capture_default_str();
   command->add_option("--epoch", run.epoch,
                       "Numbering epoch; 0: the wall clock");
+  command->add_option("--activity", run.scenario.activity_id, "Activity id")
+      ->required();
   AddActivity(*command, run);
   AddTruth(*command, run.truth);
   CLI::Option* corner = AddArea(*command, run.scenario.area);
@@ -224,6 +227,76 @@ CLI::App* AddRun(CLI::App& app, RunOptions& run) {
       ->excludes(server);
   command->add_flag("--progress", run.show_progress, "Show a progress bar");
   command->add_flag("--json", run.json, "Print the survey record, one line");
+  return command;
+}
+
+CLI::App* AddReplay(CLI::App& app, ReplayOptions& replay) {
+  CLI::App* command = app.add_subcommand(
+      "replay",
+      "Send recordings: NMEA logs (own soundings, AIS), tables of soundings, "
+      "beams or vessels (CSV, XYZ, GeoJSON, GeoPackage), Autoferry detections");
+  command->add_option("files", replay.paths, "Recordings, gzip or not")
+      ->required()
+      ->type_name("FILE...");
+  RecordingOptions& recording = replay.recording;
+  command
+      ->add_option("--format", recording.format,
+                   "What the files are (default: told from their content)")
+      ->check(CLI::IsMember({"nmea", "table", "autoferry"}));
+  CLI::Option* server = command->add_option(
+      "--server", replay.server,
+      "host:port or unix:/path (without: only say what is in the files)");
+  command->add_option("--source", replay.source_id, "Source id of all messages")
+      ->capture_default_str();
+  command->add_option("--epoch", replay.epoch,
+                      "Numbering epoch; 0: the wall clock");
+  command
+      ->add_option("--rate", replay.rate,
+                   "Times the recorded pace; 0: flat out")
+      ->capture_default_str();
+  command->add_flag("--from-now", replay.from_now,
+                    "Shift all times so that the first is now");
+  AddTime(
+      *command, "--start-time", recording.start_time,
+      "Time of the first line of a log that tells none; the day of one that "
+      "tells times of day alone");
+  command
+      ->add_option("--line-interval-s", recording.line_interval_s,
+                   "Between lines that tell no time")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
+  command->add_flag("--positive-up", recording.positive_up,
+                    "The table's values are elevations");
+  command->add_option("--depth-std-m", recording.depth_std_m,
+                      "1 sigma of depths that come without (default: that of "
+                      "IHO S-44 order 1b)");
+  command->add_flag("--uncertainty-95", recording.uncertainty_95,
+                    "The table's uncertainties are those of 95 %");
+  command
+      ->add_option("--transducer-depth-m", recording.transducer_depth_m,
+                   "Depth of the transducer below the surface, added to depths "
+                   "below it")
+      ->capture_default_str();
+  command->add_option("--water-level-m", replay.water_level_m,
+                      "Depths count from the surface, which is so far above "
+                      "the mission's datum (default: they count from the "
+                      "datum)");
+  command->add_option("--activity", replay.activity_id, "Activity id of pings")
+      ->capture_default_str();
+  command->add_option("--cell-m", replay.cell_size_m, "Cell of the local map")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
+  AddActivity(*command, replay);
+  command
+      ->add_option("--pings-out", replay.pings_out,
+                   "Without --server: write length-delimited pings")
+      ->excludes(server);
+  command
+      ->add_option("--reports-out", replay.reports_out,
+                   "Without --server: write length-delimited reports")
+      ->excludes(server);
+  command->add_flag("--progress", replay.show_progress, "Show a progress bar");
+  command->add_flag("--json", replay.json, "Print what was sent, one line");
   return command;
 }
 
@@ -286,21 +359,25 @@ absl::Status CheckArea(const CLI::App& command, bool has_other) {
 
 int Main(int argc, char** argv) {
   CLI::App app(
-      "fathom-feeder: simulated surveys for a Fathom server.\n"
+      "fathom-feeder: simulated surveys and recordings for a Fathom server.\n"
       "Angles are degrees, distances metres, times RFC 3339, deviations 1 "
       "sigma.\n"
       "Example:\n"
       "  fathom-feeder run --server 127.0.0.1:7430 --activity bay --etopo \\\n"
       "    --auto-area 1000 --progress --json > survey.json\n"
       "  fathom-feeder evaluate --server 127.0.0.1:7430 --etopo --survey "
-      "survey.json");
+      "survey.json\n"
+      "  fathom-feeder replay day.nmea --server 127.0.0.1:7430 --rate 10 "
+      "--progress");
   app.require_subcommand(1);
   RunOptions run;
   // Until --sonar-cell-m is given it is the map's cell.
   run.scenario.sonar.sonar_cell_m = 0.0;
   EvaluateOptions evaluate;
   QuestionsOptions questions;
+  ReplayOptions replay;
   const CLI::App* run_command = AddRun(app, run);
+  const CLI::App* replay_command = AddReplay(app, replay);
   const CLI::App* evaluate_command = AddEvaluate(app, evaluate);
   AddQuestions(app, questions);
   CLI11_PARSE(app, argc, argv);
@@ -312,6 +389,8 @@ int Main(int argc, char** argv) {
     }
     status = CheckArea(*run_command, run.auto_area_side_m.has_value());
     if (status.ok()) status = RunSurvey(run);
+  } else if (replay_command->parsed()) {
+    status = Replay(replay);
   } else if (evaluate_command->parsed()) {
     status = CheckArea(*evaluate_command, !evaluate.survey_path.empty());
     if (status.ok()) status = Evaluate(evaluate);

@@ -2,6 +2,7 @@
 
 #include <google/protobuf/util/delimited_message_util.h>
 
+#include <string_view>
 #include <utility>
 
 #include "absl/strings/str_format.h"
@@ -9,6 +10,13 @@
 
 namespace fathom::feeder {
 namespace {
+
+std::string ReasonName(v1::RejectReason reason) {
+  constexpr std::string_view kPrefix = "REJECT_REASON_";
+  std::string name = v1::RejectReason_Name(reason);
+  if (name.starts_with(kPrefix)) name.erase(0, kPrefix.size());
+  return name;
+}
 
 template <typename Message>
 absl::Status Record(Message& message, const std::string& source_id,
@@ -45,6 +53,26 @@ absl::Status CloseWritten(std::ofstream& file) {
 }
 
 }  // namespace
+
+std::map<std::string, std::uint64_t> RejectCounts(
+    const client::IngestProgress& progress) {
+  std::map<std::string, std::uint64_t> counts;
+  for (const v1::RejectCount& reject : progress.rejects) {
+    counts[ReasonName(reject.reason())] += reject.count();
+  }
+  return counts;
+}
+
+std::string RejectNote(const SinkState& state) {
+  std::string note;
+  for (const client::IngestProgress* progress :
+       {&state.pings, &state.reports}) {
+    for (const auto& [reason, count] : RejectCounts(*progress)) {
+      note += absl::StrFormat("  %s %d", reason, count);
+    }
+  }
+  return note.empty() ? "  no rejects" : note;
+}
 
 absl::StatusOr<std::unique_ptr<StreamSink>> StreamSink::Open(
     const client::Client& client, const client::IngestStreamOptions& options) {

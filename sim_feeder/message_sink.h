@@ -8,7 +8,9 @@
 #ifndef FATHOM_SIM_FEEDER_MESSAGE_SINK_H_
 #define FATHOM_SIM_FEEDER_MESSAGE_SINK_H_
 
+#include <cstdint>
 #include <fstream>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -25,6 +27,13 @@ struct SinkState {
   client::IngestProgress pings;
   client::IngestProgress reports;
 };
+
+// What was refused, by reason (proto names without prefix).
+std::map<std::string, std::uint64_t> RejectCounts(
+    const client::IngestProgress& progress);
+
+// The same of both for a progress bar: "  GATED 12  STALE 1" or "  no rejects".
+std::string RejectNote(const SinkState& state);
 
 class MessageSink {
  public:

@@ -18,7 +18,8 @@ constexpr std::size_t kBarWidth = 20;
 }  // namespace
 
 std::string FormatProgress(std::uint64_t done, std::uint64_t total,
-                           double seconds, const std::string& note) {
+                           std::string_view unit, double seconds,
+                           const std::string& note) {
   const double part = total == 0
                           ? 1.0
                           : std::min(1.0, static_cast<double>(done) /
@@ -32,14 +33,16 @@ std::string FormatProgress(std::uint64_t done, std::uint64_t total,
         std::llround(static_cast<double>(total - done) / rate);
     eta = absl::StrFormat("%d:%02d", rest_s / 60, rest_s % 60);
   }
-  return absl::StrFormat("[%s%s] %3.0f %%  %d/%d pings  %.0f/s  ETA %s  %s",
+  return absl::StrFormat("[%s%s] %3.0f %%  %d/%d %s  %.0f/s  ETA %s  %s",
                          std::string(filled, '#'),
                          std::string(kBarWidth - filled, '.'), 100.0 * part,
-                         done, total, rate, eta, note);
+                         done, total, unit, rate, eta, note);
 }
 
-ProgressBar::ProgressBar(std::uint64_t total, bool enabled)
+ProgressBar::ProgressBar(std::uint64_t total, std::string_view unit,
+                         bool enabled)
     : total_(total),
+      unit_(unit),
       enabled_(enabled),
       terminal_(isatty(STDERR_FILENO) != 0),
       start_(std::chrono::steady_clock::now()),
@@ -66,7 +69,7 @@ void ProgressBar::Draw(std::uint64_t done, const std::string& note) {
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start_)
           .count();
-  const std::string line = FormatProgress(done, total_, seconds, note);
+  const std::string line = FormatProgress(done, total_, unit_, seconds, note);
   // Carriage return and "erase to the end of the line" redraw in place.
   std::fputs(
       terminal_ ? ("\r" + line + "\x1b[K").c_str() : (line + "\n").c_str(),

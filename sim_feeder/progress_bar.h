@@ -11,17 +11,19 @@
 #include <chrono>
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 namespace fathom::feeder {
 
-// The line, for `done` of `total` after `seconds`; `note` ends it.
+// The line, for `done` of `total` `unit` after `seconds`; `note` ends it.
 std::string FormatProgress(std::uint64_t done, std::uint64_t total,
-                           double seconds, const std::string& note);
+                           std::string_view unit, double seconds,
+                           const std::string& note);
 
 class ProgressBar {
  public:
-  // Draws nothing if not `enabled`.
-  ProgressBar(std::uint64_t total, bool enabled);
+  // Draws nothing if not `enabled`. `unit`, a literal: what is counted.
+  ProgressBar(std::uint64_t total, std::string_view unit, bool enabled);
 
   // Whether Update would draw now: lets the caller skip composing a note.
   bool Due() const;
@@ -33,6 +35,7 @@ class ProgressBar {
   void Draw(std::uint64_t done, const std::string& note);
 
   const std::uint64_t total_;
+  const std::string_view unit_;
   const bool enabled_;
   const bool terminal_;
   const std::chrono::steady_clock::time_point start_;

@@ -17,6 +17,7 @@
 #include "base/status_macros.h"
 #include "client/client.h"
 #include "client/proto_time.h"
+#include "sim_feeder/activity.h"
 #include "sim_feeder/angles.h"
 #include "sim_feeder/progress_bar.h"
 
@@ -29,34 +30,6 @@ double SecondsSince(SteadyClock::time_point start) {
   return std::chrono::duration<double>(SteadyClock::now() - start).count();
 }
 
-std::string ReasonName(v1::RejectReason reason) {
-  constexpr std::string_view kPrefix = "REJECT_REASON_";
-  std::string name = v1::RejectReason_Name(reason);
-  if (name.starts_with(kPrefix)) name.erase(0, kPrefix.size());
-  return name;
-}
-
-std::string RejectNote(const SinkState& state) {
-  std::string note;
-  for (const client::IngestProgress* progress :
-       {&state.pings, &state.reports}) {
-    for (const v1::RejectCount& reject : progress->rejects) {
-      note += absl::StrFormat("  %s %d", ReasonName(reject.reason()),
-                              reject.count());
-    }
-  }
-  return note.empty() ? "  no rejects" : note;
-}
-
-std::map<std::string, std::uint64_t> CountsOf(
-    const client::IngestProgress& progress) {
-  std::map<std::string, std::uint64_t> counts;
-  for (const v1::RejectCount& reject : progress.rejects) {
-    counts[ReasonName(reject.reason())] += reject.count();
-  }
-  return counts;
-}
-
 void AddAcks(const SinkState& state, SurveyRecord& record) {
   record.pings_durable = state.pings.durable_sequence;
   record.reports_durable = state.reports.durable_sequence;
@@ -64,8 +37,8 @@ void AddAcks(const SinkState& state, SurveyRecord& record) {
   record.reconnects = state.pings.reconnects + state.reports.reconnects;
   record.map_revision =
       std::max(state.pings.map_revision, state.reports.map_revision);
-  record.rejects = CountsOf(state.pings);
-  record.report_rejects = CountsOf(state.reports);
+  record.rejects = RejectCounts(state.pings);
+  record.report_rejects = RejectCounts(state.reports);
 }
 
 void WriteTrackLine(const Simulation& simulation, std::ostream& track) {
@@ -101,26 +74,6 @@ absl::StatusOr<SurveyArea> DecideArea(const RunOptions& options,
   return picked.area;
 }
 
-absl::Status OpenActivity(const client::Client& client,
-                          const RunOptions& options,
-                          const Simulation& simulation) {
-  const Scenario& scenario = simulation.scenario();
-  v1::StartActivityRequest request;
-  request.set_activity_id(scenario.activity_id);
-  request.set_vehicle_id(options.vehicle_id);
-  *request.mutable_time() = client::ToProto(scenario.start_time);
-  v1::ActivityParameters& parameters = *request.mutable_parameters();
-  parameters = options.activity;
-  parameters.mutable_south_west()->set_latitude_deg(
-      scenario.area.south_west.latitude_deg);
-  parameters.mutable_south_west()->set_longitude_deg(
-      scenario.area.south_west.longitude_deg);
-  parameters.set_north_extent_m(scenario.area.north_extent_m);
-  parameters.set_east_extent_m(scenario.area.east_extent_m);
-  parameters.set_cell_size_m(scenario.area.cell_size_m);
-  return client.StartActivity(request).status();
-}
-
 void PrintSummary(const SurveyRecord& record) {
   absl::FPrintF(
       stderr,
@@ -137,20 +90,6 @@ void PrintSummary(const SurveyRecord& record) {
   for (const auto& [reason, count] : record.report_rejects) {
     absl::FPrintF(stderr, "reports rejected: %s %d\n", reason, count);
   }
-}
-
-// How a run ended that began with options.start_activity.
-absl::Status CompleteActivity(const client::Client& client,
-                              const std::string& activity_id) {
-  v1::CompleteActivityRequest request;
-  request.set_activity_id(activity_id);
-  FATHOM_ASSIGN_OR_RETURN(const v1::CompleteActivityResponse response,
-                          client.CompleteActivity(request));
-  absl::FPrintF(stderr,
-                "activity %s complete: %d local cells to %d global leaves\n",
-                activity_id, response.transfer().local_cells(),
-                response.transfer().leaves_written());
-  return absl::OkStatus();
 }
 
 absl::StatusOr<std::unique_ptr<Simulation>> PrepareSimulation(
@@ -187,7 +126,7 @@ absl::StatusOr<std::unique_ptr<Simulation>> PrepareSimulation(
 absl::Status DriveSurvey(Simulation& simulation, MessageSink& sink, double rate,
                          bool show_progress, std::ostream* track,
                          SurveyRecord& record) {
-  ProgressBar bar(simulation.pings_planned(), show_progress);
+  ProgressBar bar(simulation.pings_planned(), "pings", show_progress);
   const SteadyClock::time_point start = SteadyClock::now();
   while (const std::optional<Simulation::Message> message = simulation.Next()) {
     if (rate > 0.0) {
@@ -265,7 +204,12 @@ absl::Status RunSurvey(const RunOptions& options) {
     FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<client::Client> client,
                             client::Client::Connect(options.server, {}));
     if (options.start_activity) {
-      FATHOM_RETURN_IF_ERROR(OpenActivity(*client, options, *simulation));
+      FATHOM_RETURN_IF_ERROR(
+          OpenActivity(*client, {.id = scenario.activity_id,
+                                 .vehicle_id = options.vehicle_id,
+                                 .time = scenario.start_time,
+                                 .area = scenario.area,
+                                 .parameters = options.activity}));
     }
     client::IngestStreamOptions stream;
     stream.source_id = options.source_id;

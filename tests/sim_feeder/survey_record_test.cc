@@ -75,7 +75,7 @@ TEST(MakeQuestions, SameSeedSameQuestions) {
 
 TEST(FormatProgress, ShowsShareRateAndTimeLeft) {
   // 500 of 2000 in 10 s: 25 %, 50 a second, 1500 left: 30 s.
-  EXPECT_EQ(FormatProgress(500, 2000, 10.0, "note"),
+  EXPECT_EQ(FormatProgress(500, 2000, "pings", 10.0, "note"),
             "[#####...............]  25 %  500/2000 pings  50/s  ETA 0:30  "
             "note");
 }

@@ -1,0 +1,254 @@
+"""`fathom-feeder replay`: recordings of real days at sea into a live server.
+
+What the recordings hold is read here once more with Python's own means, and
+the map is asked at their places. Skipped without ../shared/data.
+"""
+
+import csv
+import gzip
+import json
+import os
+import pathlib
+import random
+import select
+import socket
+import statistics
+import subprocess
+import threading
+import unittest
+
+from live_server import (DEADLINE_S, FEEDER, LiveTest, Server, obstacle, types)
+
+DATA = pathlib.Path(os.environ["FATHOM_SHARED_DATA_DIR"])
+SOUNDINGS = DATA / "soundings"
+CONTACTS = DATA / "contacts"
+
+
+def feeder(*arguments):
+    return subprocess.run([FEEDER, "replay", *map(str, arguments)],
+                          capture_output=True, text=True,
+                          timeout=4 * DEADLINE_S, check=False)
+
+
+class CuttingProxy:
+    """Forwards one listening port to a server and cuts the connection after
+    so many bytes from the client, `cuts` times; then it stays."""
+
+    def __init__(self, address, cuts, after_bytes):
+        host, port = address.rsplit(":", 1)
+        self.target = (host, int(port))
+        self.left = cuts
+        self.after_bytes = after_bytes
+        self.made = 0
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        self.address = f"127.0.0.1:{self.listener.getsockname()[1]}"
+        self.thread = threading.Thread(target=self.accept, daemon=True)
+        self.thread.start()
+
+    def accept(self):
+        while True:
+            try:
+                client, _ = self.listener.accept()
+            except OSError:
+                return
+            threading.Thread(target=self.carry, args=(client,),
+                             daemon=True).start()
+
+    def carry(self, client):
+        cut_here = self.left > 0
+        if cut_here:
+            self.left -= 1
+        sent = 0
+        with client, socket.create_connection(self.target) as server:
+            while True:
+                ready, _, _ = select.select([client, server], [], [])
+                for source in ready:
+                    try:
+                        data = source.recv(16384)
+                    except OSError:
+                        return
+                    if not data:
+                        return
+                    if source is client:
+                        sent += len(data)
+                        if cut_here and sent > self.after_bytes:
+                            self.made += 1
+                            return  # Both ends close, the data is lost.
+                    (server if source is client else client).sendall(data)
+
+    def close(self):
+        self.listener.close()
+
+
+class Replay(LiveTest):
+
+    def setUp(self):
+        super().setUp()
+        if not DATA.exists():
+            self.skipTest(f"no {DATA}")
+
+    def server_about(self, latitude, longitude, side_nmi=20, name="m.fathom"):
+        return Server(self.folder / name, "--create", "--center",
+                      f"{latitude},{longitude}", "--side-nmi", str(side_nmi))
+
+    def replay(self, server, *arguments):
+        address = server if isinstance(server, str) else server.address
+        done = feeder(*arguments, "--server", address, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return json.loads(done.stdout)
+
+    def seabed(self, server, latitude, longitude):
+        answer = server.obstacle.QueryObstacle(
+            obstacle.QueryObstacleRequest(
+                position=types.GeodeticPoint(latitude_deg=latitude,
+                                             longitude_deg=longitude),
+                depth_m=1, confidence=0.95), timeout=DEADLINE_S).answer
+        return answer.seabed if answer.HasField("seabed") else None
+
+    def errors_at(self, server, soundings):
+        """Map's mean depth minus the sounding, where the map knows."""
+        found = [(self.seabed(server, lat, lon), depth)
+                 for lat, lon, depth in soundings]
+        return [seabed.depth_m - depth for seabed, depth in found
+                if seabed is not None]
+
+    def test_an_nmea_log_maps_what_was_under_the_keel(self):
+        with gzip.open(SOUNDINGS / "plaka_track.csv.gz", "rt") as file:
+            track = [(float(row["lat"]), float(row["lon"]),
+                      float(row["depth_m"])) for row in csv.DictReader(file)]
+        with self.server_about(60.08, 23.54) as server:
+            sent = self.replay(server, SOUNDINGS / "plaka.log.gz",
+                               "--start-time", "2014-07-01T00:00:00Z")
+            self.assertEqual(sent["soundings"], len(track))
+            # A depth before the first position cannot be placed.
+            self.assertEqual(sent["passed_over"]["no position"], 1)
+            accepted = sent["measurements_accepted"]
+            held_back = sum(sent["rejects"].values())
+            self.assertEqual(accepted + held_back, len(track))
+            self.assertLess(held_back, 0.02 * len(track))
+            self.assertEqual(sent["pings_durable"], sent["pings"])
+            errors = self.errors_at(server, random.Random(1).sample(track, 500))
+            self.assertEqual(len(errors), 500)
+            # The slope under a cell of 10 m, and the position's 2 s of lag.
+            self.assertLess(abs(statistics.median(errors)), 0.1)
+            self.assertLess(statistics.median(map(abs, errors)), 0.5)
+
+            # The same track as a table: the same soundings (another activity).
+            again = self.replay(server, SOUNDINGS / "plaka_track.csv.gz",
+                                "--activity", "table", "--source", "table",
+                                "--start-time", "2014-07-01T00:00:00Z")
+            self.assertEqual(again["soundings"], len(track))
+
+    def test_crowd_sourced_soundings_and_their_lost_bottoms(self):
+        files = sorted((SOUNDINGS / "wibl").glob("*.json"))
+        expected = sum(len(json.loads(path.read_text())["features"])
+                       for path in files)
+        with self.server_about(48.8, -123.3, side_nmi=200) as server:
+            total = held_back = 0
+            for n, path in enumerate(files):
+                sent = self.replay(server, path, "--activity", f"visit{n}",
+                                   "--source", f"visit{n}", "--cell-m", 20)
+                total += sent["soundings"]
+                self.assertEqual(sent["passed_over"], {})
+                self.assertEqual(
+                    sent["measurements_accepted"]
+                    + sum(sent["rejects"].values()), sent["soundings"])
+                held_back += sent["rejects"].get("GATED", 0)
+            self.assertEqual(total, expected)
+            # 0.55 m beside 90 m: the logger's bottom is lost.
+            self.assertGreater(held_back, 0)
+
+    def test_multibeam_pings_give_one_seabed(self):
+        path = SOUNDINGS / "r2sonic2026_sf_every8th_ping.csv.gz"
+        with gzip.open(path, "rt") as file:
+            rows = list(csv.DictReader(file))
+        with self.server_about(37.757, -122.377) as server:
+            sent = self.replay(server, path, "--cell-m", 1, "--depth-std-m",
+                               0.3)
+            self.assertEqual(sent["pings"], len({row["ping"] for row in rows}))
+            self.assertGreater(sent["measurements_accepted"],
+                               0.97 * len(rows))
+            # Straight below the sonar the seabed is that of the middle beams.
+            nadir = [(float(row["lat"]), float(row["lon"]),
+                      float(row["depth_below_sonar_m"])) for row in rows
+                     if 0 < abs(float(row["across_m"])) < 0.5]
+            self.assertGreater(len(nadir), 20)
+            errors = self.errors_at(server, nadir)
+            self.assertGreater(len(errors), 0.9 * len(nadir))
+            self.assertLess(statistics.median(map(abs, errors)), 0.5)
+
+    def test_a_port_full_of_ships(self):
+        path = CONTACTS / "solent-ais" / "SolentAIS_20160112_130211.csv"
+        with open(path, encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        ships = {row["MMSI"] for row in rows}
+        with self.server_about(50.8, -1.2, side_nmi=60) as server:
+            sent = self.replay(server, path)
+            self.assertEqual(sent["contact_reports"], len(rows))
+            self.assertEqual(sent["contacts"], len(ships))
+            self.assertEqual(sent["reports_durable"], len(rows))
+            request = obstacle.ListContactsRequest(include_inactive=True)
+            request.time.FromJsonString(sent["end_time"])
+            listed = server.obstacle.ListContacts(request, timeout=DEADLINE_S)
+            heard = {contact.contact_id for contact in listed.contacts}
+            self.assertLessEqual(heard, {f"mmsi:{int(s):09d}" for s in ships})
+            self.assertGreaterEqual(len(heard), len(ships) - 1)
+
+    def test_every_other_recording_ends(self):
+        with self.server_about(0, 0, side_nmi=1000) as server:
+            for path, reports in (
+                    (CONTACTS / "gpsd-aivdm" / "sample.aivdm", 12),
+                    (CONTACTS / "gpsd-aivdm" / "ais-nmea-type6-fid55.log",
+                     797),
+                    (CONTACTS / "libais" / "tagblock.nmea", 3),
+                    (CONTACTS / "libais" / "typeexamples.nmea", 3)):
+                with self.subTest(path=path.name):
+                    sent = self.replay(server, path, "--source", path.stem,
+                                       "--start-time", "2012-01-01T00:00:00Z")
+                    self.assertEqual(sent["contact_reports"], reports)
+                    self.assertEqual(sent["reports_durable"], reports)
+            for path in sorted((CONTACTS / "autoferry").glob("*_detections*")):
+                with self.subTest(path=path.name):
+                    sent = self.replay(server, path, "--source", path.stem)
+                    self.assertGreater(sent["contact_reports"], 50)
+                    self.assertEqual(sent["contacts"], 2)
+
+    def test_twenty_cuts_of_the_link_change_nothing(self):
+        path = SOUNDINGS / "plaka.log.gz"
+        arguments = (path, "--start-time", "2014-07-01T00:00:00Z", "--epoch",
+                     1)
+        with self.server_about(60.08, 23.54, name="whole.fathom") as server:
+            sent = self.replay(server, *arguments)
+            whole = server.status(digest=True).map_digest
+        with self.server_about(60.08, 23.54, name="cut.fathom") as server:
+            proxy = CuttingProxy(server.address, cuts=20, after_bytes=20_000)
+            self.addCleanup(proxy.close)
+            cut = self.replay(proxy.address, *arguments)
+            self.assertEqual(proxy.made, 20)
+            self.assertEqual(cut["pings_durable"], sent["pings"])
+            self.assertEqual(server.status(digest=True).map_digest, whole)
+
+    def test_bad_input_ends_with_one_clear_line(self):
+        broken = self.folder / "broken.csv"
+        broken.write_text("lat,lon,colour\n1,2,red\n")
+        empty = self.folder / "empty.nmea"
+        empty.write_text("$GPRMC,broken*00\n")
+        log = CONTACTS / "gpsd-aivdm" / "sample.aivdm"
+        for arguments, word in (
+                (["/nonexistent.csv"], "no file /nonexistent.csv"),
+                ([broken], "no column for depth or mmsi"),
+                ([empty], "bad checksum 1"),
+                ([SOUNDINGS / "6_184_1440.mb121"], "is no table of points"),
+                ([log], "--start-time"),
+                ([log, "--from-now", "--rate", "2"], "--from-now"),
+                ([log, "--start-time", "2012-01-01T00:00:00Z", "--server",
+                  "127.0.0.1:1"], "127.0.0.1:1")):
+            with self.subTest(arguments=arguments):
+                done = feeder(*arguments)
+                self.assertGreater(done.returncode, 0)
+                self.assertIn(word, done.stderr)
+                self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
