@@ -23,23 +23,30 @@ setUpModule = node_tools.install
 
 class GrpcJs(LiveTest):
 
+    def run_script(self, server, name):
+        return subprocess.run(
+            ["node", NODE / name, server.address, ROOT / "proto"],
+            capture_output=True, text=True, check=False,
+            timeout=4 * DEADLINE_S)
+
     def test_the_main_job(self):
         with self.new_mission() as server:
-            done = subprocess.run(
-                ["node", NODE / "main_job.mjs", server.address,
-                 ROOT / "proto"], capture_output=True, text=True,
-                check=False, timeout=4 * DEADLINE_S)
+            done = self.run_script(server, "main_job.mjs")
             self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
             self.assertIn("all held", done.stdout)
             self.assertFalse(server.status().activities[0].open)
 
+    def test_every_call(self):
+        with self.new_mission() as server:
+            done = self.run_script(server, "every_call.mjs")
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+            self.assertIn("all held", done.stdout)
+            self.assertTrue((self.folder / "copy.fathom").exists())
+
     def test_the_script_fails_where_the_answers_are_others(self):
         with self.new_mission() as server:
             import_chart(server)  # It expects a new mission.
-            done = subprocess.run(
-                ["node", NODE / "main_job.mjs", server.address,
-                 ROOT / "proto"], capture_output=True, text=True,
-                check=False, timeout=4 * DEADLINE_S)
+            done = self.run_script(server, "main_job.mjs")
             self.assertNotEqual(done.returncode, 0)
             self.assertIn("AssertionError", done.stderr)
 

@@ -230,10 +230,10 @@ class Oracle : public ClientLive {
     constexpr std::array kClasses = {
         v1::CONTACT_CLASS_SMALL_CRAFT, v1::CONTACT_CLASS_VESSEL,
         v1::CONTACT_CLASS_DEEP_DRAUGHT, v1::CONTACT_CLASS_DRIFTING};
-    constexpr int kTracks = 24;
+    constexpr std::size_t kTracks = 24;
     v1::ReportContactsRequest request;
     std::uint64_t sequence = 0;
-    for (int n = 0; n < kTracks; ++n) {
+    for (std::size_t n = 0; n < kTracks; ++n) {
       const v1::ContactClass contact_class = kClasses[n % kClasses.size()];
       oracle::Track track;
       for (const auto& of_class : status.contacts().classes()) {

@@ -8,53 +8,13 @@
 import assert from 'node:assert/strict';
 
 import grpc from '@grpc/grpc-js';
-import protoLoader from '@grpc/proto-loader';
 
-const [address, protoRoot] = process.argv.slice(2);
-assert.ok(protoRoot, 'usage: node main_job.mjs HOST:PORT PROTO_ROOT');
-
-const v1 = grpc.loadPackageDefinition(protoLoader.loadSync(
-    ['ingest', 'mission', 'obstacle'].map(
-        name => `fathom/v1/${name}_service.proto`),
-    {includeDirs: [protoRoot], longs: Number, enums: String, defaults: true},
-    )).fathom.v1;
-const credentials = grpc.credentials.createInsecure();
-const ingest = new v1.IngestService(address, credentials);
-const mission = new v1.MissionService(address, credentials);
-const obstacle = new v1.ObstacleService(address, credentials);
-
-const deadline = () => ({deadline: Date.now() + 60_000});
-
-// A unary call as a promise.
-const call = (client, method, request) => new Promise((resolve, reject) =>
-    client[method](request, deadline(), (error, response) =>
-        error ? reject(error) : resolve(response)));
-
-// A call that streams `requests` and answers once.
-const send = (client, method, requests) => new Promise((resolve, reject) => {
-  const stream = client[method](deadline(), (error, response) =>
-      error ? reject(error) : resolve(response));
-  for (const request of requests) stream.write(request);
-  stream.end();
-});
-
-// A call that streams both ways (or only back): all answers.
-const exchange = (stream, requests) => new Promise((resolve, reject) => {
-  const answers = [];
-  stream.on('data', answer => answers.push(answer));
-  stream.on('error', reject);
-  stream.on('end', () => resolve(answers));
-  if (requests) {
-    for (const request of requests) stream.write(request);
-    stream.end();
-  }
-});
+import {
+  address, call, deadline, exchange, ingest, mission, near, obstacle, send,
+} from './calls.mjs';
 
 const place = {latitudeDeg: 41.5, longitudeDeg: -71.4};
 const time = {seconds: 1_767_225_600, nanos: 0};
-const near = (actual, expected, tolerance) => assert.ok(
-    Math.abs(actual - expected) <= tolerance,
-    `${actual} is not within ${tolerance} of ${expected}`);
 
 const status = await call(mission, 'GetMissionStatus', {});
 assert.equal(status.verticalDatum, 'MLLW');
