@@ -4,10 +4,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cstdint>
 #include <memory>
 
+#include "base/time.h"
 #include "client/client.h"
+#include "client/proto_time.h"
 #include "tests/integration/live_server.h"
 #include "tests/testing/status_matchers.h"
 
@@ -149,6 +153,136 @@ TEST_F(ClientLive, APingStreamSurvivesKillsWithNothingLostOrDoubled) {
                               client->QueryObstacle(WhereItHits(10, 0)));
   EXPECT_NEAR(answer.answer().seabed().std_m(), 0.0387298, 1e-5);
   EXPECT_EQ(server->Terminate(), 0);
+}
+
+// Metres of a degree about 41.5 N, good to 0.1 %.
+v1::GeodeticPoint Place(double north_m, double east_m) {
+  v1::GeodeticPoint point;
+  point.set_latitude_deg(41.5 + north_m / 111'073);
+  point.set_longitude_deg(-71.4 + east_m / 83'490);
+  return point;
+}
+
+constexpr Time kStart = TimeFromUnixMicros(1'767'225'600'000'000);
+
+v1::ContactReport Fix(const char* contact, std::uint64_t sequence, int second,
+                      double east_m) {
+  v1::ContactReport report;
+  report.set_source_id("c4i");
+  report.set_epoch(1);
+  report.set_sequence(sequence);
+  report.set_contact_id(contact);
+  report.set_contact_class(v1::CONTACT_CLASS_VESSEL);
+  *report.mutable_time() = ToProto(kStart + std::chrono::seconds(second));
+  *report.mutable_fix()->mutable_position() = Place(0, east_m);
+  report.mutable_fix()->set_velocity_east_m_s(5);
+  return report;
+}
+
+TEST_F(ClientLive, EveryQuestionOfAPlanner) {
+  LiveServer server(folder_, /*create=*/true);
+  ASSERT_NE(server.port(), 0);
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto client,
+                              Client::Connect(server.address(), {}));
+  // Cells of 10 m that begin at the place itself; 30 m +- 1 m of water, and
+  // 3 m in the cell from 50 m to 60 m east.
+  v1::StartActivityRequest start = Bay();
+  *start.mutable_parameters()->mutable_south_west() = Place(0, 0);
+  start.mutable_parameters()->mutable_default_prior()->set_depth_m(30);
+  start.mutable_parameters()->mutable_default_prior()->set_std_m(1);
+  FATHOM_ASSERT_OK(client->StartActivity(start).status());
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto stream,
+                              client->OpenPingStream({.source_id = "uuv"}));
+  v1::Ping ping = OneBeam();
+  *ping.mutable_pose()->mutable_position() = Place(105, 5);
+  ping.set_depth_m(0, 3);
+  ping.set_std_m(0, 0.0625);
+  FATHOM_ASSERT_OK(stream->Send(ping).status());
+  FATHOM_ASSERT_OK(stream->Finish());
+  const std::uint64_t revision = stream->progress().map_revision;
+
+  v1::CheckTrajectoryRequest check;
+  check.set_min_revision(revision);
+  check.mutable_trajectory()->set_confidence(0.95);
+  for (int i = 0; i < 2; ++i) {
+    v1::Waypoint& waypoint = *check.mutable_trajectory()->add_waypoints();
+    *waypoint.mutable_position() = Place(105, 5 + 100 * i);
+    waypoint.set_depth_m(10);
+    *waypoint.mutable_time() = ToProto(kStart + std::chrono::seconds(50 * i));
+  }
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto verdict,
+                              client->CheckTrajectory(check));
+  EXPECT_EQ(verdict.state(), v1::OBSTACLE_STATE_OCCUPIED);
+  // 45 m at 2 m/s: 22.5 s; earlier by (sqrt(1/2) - 1/2) 10 m at most.
+  const double met_s =
+      ToSeconds(FromProto(verdict.first_conflict().time()) - kStart);
+  EXPECT_LT(met_s, 22.6);
+  EXPECT_GT(met_s, 22.5 - 1.04 - 0.1);
+
+  v1::FindNearestObstacleRequest nearest;
+  *nearest.mutable_position() = Place(105, 5);
+  nearest.set_depth_m(10);
+  *nearest.mutable_time() = ToProto(kStart);
+  nearest.set_confidence(0.95);
+  nearest.set_search_radius_m(500);
+  nearest.set_treat_unknown_as(v1::UNKNOWN_TREATMENT_FREE);
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto found,
+                              client->FindNearestObstacle(nearest));
+  ASSERT_TRUE(found.found());
+  EXPECT_NEAR(found.distance_m(), 45, 0.1);
+  EXPECT_NEAR(found.bearing_deg(), 90, 0.5);
+
+  v1::GetRegionRequest area;
+  *area.mutable_south_west() = Place(0, 0);
+  *area.mutable_north_east() = Place(300, 400);
+  area.set_resolution_m(10);
+  area.set_activity_id("bay");
+  FATHOM_ASSERT_OK_AND_ASSIGN(const Region region, client->GetRegion(area));
+  // k = 256/257 (eq. 4.17): 30 - 27 k = 3.105 in one cell, 30 in the others.
+  EXPECT_NEAR(std::ranges::min(region.depth_m), 30 - 27 * 256.0 / 257, 1e-4);
+  EXPECT_EQ(std::ranges::count(region.kind, v1::EVIDENCE_KIND_MEASURED), 1);
+  EXPECT_EQ(region.stamp.map_revision(), revision);
+
+  v1::ReportContactsRequest reports;
+  *reports.add_reports() = Fix("ship", 1, 0, 0);
+  *reports.add_reports() = Fix("boat", 2, 0, 1000);
+  *reports.add_reports() = Fix("ship", 3, 10, 50);
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto reported,
+                              client->ReportContacts(reports));
+  EXPECT_EQ(reported.reports_applied(), 3u);
+  v1::DropContactRequest drop;
+  drop.set_source_id("c4i");
+  drop.set_contact_id("boat");
+  *drop.mutable_time() = ToProto(kStart + std::chrono::seconds(5));
+  FATHOM_ASSERT_OK(client->DropContact(drop).status());
+  v1::ListContactsRequest list;
+  *list.mutable_time() = ToProto(kStart + std::chrono::seconds(30));
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto contacts, client->ListContacts(list));
+  ASSERT_EQ(contacts.contacts_size(), 1);
+  // 50 m, and 20 s on at 5 m/s.
+  EXPECT_NEAR((contacts.contacts(0).position().longitude_deg() + 71.4) * 83'490,
+              150, 0.5);
+  v1::GetContactHistoryRequest history;
+  history.set_source_id("c4i");
+  history.set_contact_id("ship");
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto track,
+                              client->GetContactHistory(history));
+  EXPECT_EQ(track.size(), 2u);
+
+  v1::TransferLocalMapRequest transfer;
+  transfer.set_activity_id("bay");
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto moved,
+                              client->TransferLocalMap(transfer));
+  EXPECT_EQ(moved.transfer().local_cells(), 1u);
+  v1::SaveMissionRequest save;
+  save.set_file_name("copy.fathom");
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto saved, client->SaveMission(save));
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto proof, client->VerifyMission());
+  EXPECT_TRUE(proof.ok());
+  EXPECT_EQ(proof.map_digest(), saved.map_digest());
+  FATHOM_ASSERT_OK_AND_ASSIGN(const std::uint64_t tiles,
+                              client->GetImport("none"));
+  EXPECT_EQ(tiles, 0u);
 }
 
 }  // namespace
