@@ -9,6 +9,9 @@ if(FATHOM_SANITIZE)
   add_link_options(-fsanitize=${FATHOM_SANITIZE})
 endif()
 
+# The preset `fuzz`: programs of tests/fuzz are linked with libFuzzer.
+option(FATHOM_FUZZ "Build the fuzz targets to search, with clang" OFF)
+
 if(NOT CMAKE_CXX_COMPILER_LAUNCHER)
   find_program(FATHOM_CCACHE ccache)
   mark_as_advanced(FATHOM_CCACHE)
@@ -37,7 +40,8 @@ target_compile_options(fathom_warnings INTERFACE
     $<$<CXX_COMPILER_ID:Clang>:-Wthread-safety>)
 if(FATHOM_SANITIZE)
   # g++ does not follow definitions through sanitizer instrumentation.
-  target_compile_options(fathom_warnings INTERFACE -Wno-maybe-uninitialized)
+  target_compile_options(fathom_warnings INTERFACE
+      $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
 endif()
 
 # fathom_add_library(<name> SOURCES <file>... [PUBLIC <lib>...]

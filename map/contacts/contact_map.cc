@@ -264,8 +264,10 @@ absl::Status ContactMap::Restore(StoredContact stored) {
   for (std::size_t i = 0; i < stored.estimates.size(); ++i) {
     const ContactEstimate& estimate = stored.estimates[i];
     if (estimate.key != stored.key) return invalid("an estimate of another");
-    if (!IsContactClass(estimate.contact_class) || !IsFinite(estimate)) {
-      return invalid("an estimate is not finite or has no class");
+    // Finite numbers may still lie beyond the Earth, where places are NaN.
+    if (!IsContactClass(estimate.contact_class) || !IsFinite(estimate) ||
+        !ValidateGeodetic(estimate.Position()).ok()) {
+      return invalid("an estimate is not finite, nowhere, or has no class");
     }
     if (i > 0 && estimate.time < stored.estimates[i - 1].time) {
       return invalid("estimates are not in order of time");

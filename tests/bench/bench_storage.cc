@@ -4,12 +4,14 @@
 // (TMPDIR): measure on the disk that matters.
 
 #include <benchmark/benchmark.h>
+#include <malloc.h>
 #include <unistd.h>
 
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <optional>
 #include <random>
@@ -251,12 +253,35 @@ class LargeFile {
   double write_s_ = 0;
 };
 
+// A line of /proc/self/status ("VmRSS:", "VmHWM:"), bytes.
+double MemoryOf(const std::string& line) {
+  std::ifstream status("/proc/self/status");
+  std::string word;
+  double kilobytes = 0;
+  while (status >> word && word != line) {
+  }
+  status >> kilobytes;
+  return kilobytes * 1024;
+}
+
+// Gives back what is free and lets the peak (VmHWM) start from here.
+void ForgetPeak() {
+  malloc_trim(0);
+  std::ofstream("/proc/self/clear_refs") << 5;
+}
+
 // From the closed file to the first answer (the file is in the page cache).
 void BM_Open10MLeaves(benchmark::State& state) {
   static const LargeFile large;
   double seconds = 0;
   double load_s = 0;
+  double peak_bytes = 0;
+  double held_bytes = 0;
   for (auto _ : state) {
+    state.PauseTiming();
+    ForgetPeak();
+    const double before_bytes = MemoryOf("VmRSS:");
+    state.ResumeTiming();
     const auto start = std::chrono::steady_clock::now();
     auto file = MissionFile::Open(large.path());
     auto loaded = (*file)->Load();
@@ -272,6 +297,9 @@ void BM_Open10MLeaves(benchmark::State& state) {
     load_s += std::chrono::duration<double>(read - start).count();
     seconds += std::chrono::duration<double>(end - start).count();
     state.PauseTiming();
+    peak_bytes = MemoryOf("VmHWM:") - before_bytes;
+    malloc_trim(0);
+    held_bytes = MemoryOf("VmRSS:") - before_bytes;
     restored->map.reset();
     restored->checkpoint.reset();
     file->reset();
@@ -283,6 +311,8 @@ void BM_Open10MLeaves(benchmark::State& state) {
   state.counters["leaves"] = large.leaves();
   state.counters["disk_bytes_per_leaf"] = large.bytes() / large.leaves();
   state.counters["write_s"] = large.write_s();
+  state.counters["peak_mb"] = peak_bytes / 1e6;
+  state.counters["ram_bytes_per_leaf"] = held_bytes / large.leaves();
 }
 BENCHMARK(BM_Open10MLeaves)->UseRealTime()->Unit(benchmark::kMillisecond);
 

@@ -1,0 +1,72 @@
+// Fuzz target: blobs of contacts, of their history and of activities, as far as
+// a start takes them. The first byte chooses the kind.
+
+#include <cstddef>
+#include <cstdint>
+
+#include "map/contacts/contact_map.h"
+#include "storage/activity_codec.h"
+#include "storage/contact_codec.h"
+#include "tests/fuzz/fuzz.h"
+
+namespace fathom::fuzz {
+namespace {
+
+using storage::Bytes;
+using storage::ByteSpan;
+
+void FuzzPoint(ByteSpan payload) {
+  const auto point = storage::DecodeContactPoint(
+      Sealed(storage::BlobKind::kContactEstimate, 1, payload), "point");
+  if (!point.ok()) return;
+  const Bytes stored = storage::EncodeContactPoint(*point);
+  const auto again = storage::DecodeContactPoint(stored, "again");
+  FATHOM_FUZZ_CHECK(again.ok());
+  FATHOM_FUZZ_CHECK(storage::EncodeContactPoint(*again) == stored);
+}
+
+void FuzzContact(ByteSpan payload, std::uint8_t version) {
+  const auto contact = storage::DecodeContact(
+      Sealed(storage::BlobKind::kContact, version, payload), "contact");
+  if (!contact.ok()) return;
+  const Bytes stored = storage::EncodeContact(*contact);
+  const auto again = storage::DecodeContact(stored, "again");
+  FATHOM_FUZZ_CHECK(again.ok());
+  FATHOM_FUZZ_CHECK(storage::EncodeContact(*again) == stored);
+  map::ContactMap contacts((map::ContactMapOptions()));
+  (void)contacts.Restore(*contact);
+}
+
+void FuzzActivity(ByteSpan payload) {
+  const auto activity = storage::DecodeActivity(
+      Sealed(storage::BlobKind::kActivity, 1, payload), "activity");
+  if (!activity.ok()) return;
+  const Bytes stored = storage::EncodeActivity(*activity);
+  const auto again = storage::DecodeActivity(stored, "again");
+  FATHOM_FUZZ_CHECK(again.ok());
+  FATHOM_FUZZ_CHECK(storage::EncodeActivity(*again) == stored);
+  (void)map::LocalMap::Create(activity->start.options);
+}
+
+}  // namespace
+}  // namespace fathom::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes,
+                                      std::size_t size) {
+  if (size == 0) return 0;
+  const fathom::storage::ByteSpan payload(bytes + 1, size - 1);
+  switch (bytes[0] % 4) {
+    case 0:
+      fathom::fuzz::FuzzPoint(payload);
+      break;
+    case 1:
+      fathom::fuzz::FuzzContact(payload, 1);
+      break;
+    case 2:
+      fathom::fuzz::FuzzContact(payload, 2);
+      break;
+    default:
+      fathom::fuzz::FuzzActivity(payload);
+  }
+  return 0;
+}
