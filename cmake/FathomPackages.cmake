@@ -6,7 +6,7 @@
 #   SQLite::SQLite3, fathom_zstd, Boost::headers       storage only
 #   protobuf::libprotobuf gRPC::grpc++ gRPC::grpc++_reflection  (fathom_proto)
 #   GDAL::GDAL fathom_cairo      client command line, sim_feeder, tests
-#   CLI11::CLI11 spdlog::spdlog nlohmann_json::nlohmann_json
+#   CLI11::CLI11 spdlog::spdlog nlohmann_json::nlohmann_json yaml-cpp
 #   GTest::gtest_main GTest::gmock benchmark::benchmark_main   tests
 #
 # All includes are SYSTEM ones: our warnings are not for other people's code.
@@ -19,6 +19,7 @@ find_package(SQLite3 REQUIRED)
 find_package(Boost REQUIRED)  # Headers only: Boost.CRC for CRC-32C.
 find_package(Eigen3 CONFIG REQUIRED)
 find_package(GDAL CONFIG REQUIRED)
+find_package(yaml-cpp CONFIG REQUIRED)
 find_package(CLI11 CONFIG REQUIRED)
 find_package(spdlog CONFIG REQUIRED)
 find_package(nlohmann_json CONFIG REQUIRED)

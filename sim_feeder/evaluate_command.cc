@@ -21,8 +21,6 @@ constexpr std::size_t kBatch = 4'096;
 constexpr std::uint64_t kMaxPoints = 10'000'000;
 // Estimates before this have not seen the ship move.
 constexpr double kSettlingS = 60.0;
-// Truth is asked inside the area only.
-constexpr double kEvaluationMarginM = 50.0;
 
 struct Place {
   map::GeodeticPoint position;

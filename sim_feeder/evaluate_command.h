@@ -34,6 +34,9 @@
 
 namespace fathom::feeder {
 
+// Truth is asked inside the area only: what a seabed needs about it, metres.
+inline constexpr double kEvaluationMarginM = 50.0;
+
 struct EvaluateOptions {
   std::string server;
   TruthOptions truth;

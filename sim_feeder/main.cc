@@ -16,6 +16,7 @@
 #include "sim_feeder/questions_command.h"
 #include "sim_feeder/replay/replay_command.h"
 #include "sim_feeder/run_command.h"
+#include "sim_feeder/scenario_command.h"
 
 namespace fathom::feeder {
 namespace {
@@ -300,6 +301,32 @@ CLI::App* AddReplay(CLI::App& app, ReplayOptions& replay) {
   return command;
 }
 
+CLI::App* AddScenario(CLI::App& app, ScenarioOptions& scenario) {
+  CLI::App* command = app.add_subcommand(
+      "scenario",
+      "Run a scenario file, evaluate the map and judge it by the file's own "
+      "expectations (docs/scenarios.md)");
+  command->add_option("file", scenario.path, "Scenario, YAML")
+      ->required()
+      ->type_name("FILE");
+  command->add_option("--server", scenario.server,
+                      "host:port or unix:/path (without: only check the file)");
+  command
+      ->add_option("--source", scenario.source_id, "Source id of all messages")
+      ->capture_default_str();
+  command->add_option("--epoch", scenario.epoch,
+                      "Numbering epoch; 0: the wall clock");
+  command->add_option("--seed", scenario.seed,
+                      "Seed of everything drawn (default: the file's)");
+  command->add_option("--rate", scenario.rate, "Times real time; 0: flat out")
+      ->capture_default_str();
+  command->add_flag("--progress", scenario.show_progress,
+                    "Show a progress bar");
+  command->add_flag("--json", scenario.json,
+                    "Print survey, evaluation and what was missed, one line");
+  return command;
+}
+
 CLI::App* AddEvaluate(CLI::App& app, EvaluateOptions& evaluate) {
   CLI::App* command = app.add_subcommand(
       "evaluate", "Ask the server and compare with the truth");
@@ -376,8 +403,10 @@ int Main(int argc, char** argv) {
   EvaluateOptions evaluate;
   QuestionsOptions questions;
   ReplayOptions replay;
+  ScenarioOptions scenario;
   const CLI::App* run_command = AddRun(app, run);
   const CLI::App* replay_command = AddReplay(app, replay);
+  const CLI::App* scenario_command = AddScenario(app, scenario);
   const CLI::App* evaluate_command = AddEvaluate(app, evaluate);
   AddQuestions(app, questions);
   CLI11_PARSE(app, argc, argv);
@@ -389,6 +418,8 @@ int Main(int argc, char** argv) {
     }
     status = CheckArea(*run_command, run.auto_area_side_m.has_value());
     if (status.ok()) status = RunSurvey(run);
+  } else if (scenario_command->parsed()) {
+    status = RunScenario(scenario);
   } else if (replay_command->parsed()) {
     status = Replay(replay);
   } else if (evaluate_command->parsed()) {

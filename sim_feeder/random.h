@@ -25,6 +25,8 @@ enum class RandomStream : std::uint64_t {
   kShips = 3,
   kRelief = 4,
   kEvaluation = 5,
+  kNavigation = 6,
+  kSonarFaults = 7,
 };
 
 class Random {

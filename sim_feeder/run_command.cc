@@ -159,13 +159,12 @@ absl::Status DriveSurvey(Simulation& simulation, MessageSink& sink, double rate,
   return absl::OkStatus();
 }
 
-absl::Status RunSurvey(const RunOptions& options) {
+absl::StatusOr<SurveyRecord> PerformSurvey(const RunOptions& options,
+                                           const TruthSource& truth) {
   if (!(options.rate >= 0.0) || !(options.rate <= 1e6)) {
     return absl::InvalidArgumentError(absl::StrFormat(
         "rate=%g must be in [0, 1e6]; 0 is flat out", options.rate));
   }
-  FATHOM_ASSIGN_OR_RETURN(const TruthSource truth,
-                          TruthSource::Load(options.truth));
   FATHOM_ASSIGN_OR_RETURN(std::unique_ptr<Simulation> simulation,
                           PrepareSimulation(options, truth));
   const Scenario& scenario = simulation->scenario();
@@ -224,6 +223,14 @@ absl::Status RunSurvey(const RunOptions& options) {
     }
   }
   PrintSummary(record);
+  return record;
+}
+
+absl::Status RunSurvey(const RunOptions& options) {
+  FATHOM_ASSIGN_OR_RETURN(const TruthSource truth,
+                          TruthSource::Load(options.truth));
+  FATHOM_ASSIGN_OR_RETURN(const SurveyRecord record,
+                          PerformSurvey(options, truth));
   if (options.json) absl::PrintF("%s\n", ToJson(record));
   return absl::OkStatus();
 }

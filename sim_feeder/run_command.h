@@ -50,6 +50,11 @@ struct RunOptions {
   bool json = false;
 };
 
+// Runs, and tells people the outcome on standard error. Errors: of the
+// scenario, the connection and the streams.
+absl::StatusOr<SurveyRecord> PerformSurvey(const RunOptions& options,
+                                           const TruthSource& truth);
+
 // Runs and prints: for people on standard error, with `json` the survey record
 // as one line on standard output.
 //

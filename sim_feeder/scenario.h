@@ -10,6 +10,8 @@
 
 #include "base/time.h"
 #include "sim_feeder/forward_sonar.h"
+#include "sim_feeder/navigation.h"
+#include "sim_feeder/sonar_faults.h"
 #include "sim_feeder/survey_area.h"
 #include "sim_feeder/vehicle.h"
 
@@ -29,7 +31,10 @@ struct Scenario {
   // Least water that the vehicle goes over, metres.
   double min_water_m = 4.0;
 
+  NavigationOptions navigation = {};
+
   ForwardSonarOptions sonar;
+  SonarFaults faults = {};
   // Between pings, seconds, > 0.
   double ping_interval_s = 1.0;
   // How many pings; 0: as many as cover the area once.

@@ -10,6 +10,7 @@
 #include "base/status_macros.h"
 #include "client/proto_time.h"
 #include "sim_feeder/angles.h"
+#include "sim_feeder/named_range.h"
 #include "sim_feeder/passive_sonar.h"
 #include "sim_feeder/track_plan.h"
 
@@ -54,33 +55,22 @@ std::optional<double> MedianAltitudeM(const LocalTerrain& terrain,
 absl::Status ValidateScenario(const Scenario& scenario) {
   FATHOM_RETURN_IF_ERROR(ValidateArea(scenario.area));
   FATHOM_RETURN_IF_ERROR(ValidateForwardSonar(scenario.sonar));
-  struct Range {
-    const char* name;
-    double value;
-    double low;
-    double high;
-  };
-  for (const Range& range :
-       {Range{"min_water_m", scenario.min_water_m, 0.1, 12'000.0},
-        Range{"ping_interval_s", scenario.ping_interval_s, 1e-3, 3'600.0},
-        Range{"passive_bearing_std_deg", scenario.passive_bearing_std_deg, 1e-6,
-              45.0},
-        Range{"passive_range_m", scenario.passive_range_m, 0.0, 2e7},
-        Range{"report_interval_s", scenario.report_interval_s, 1e-2, 1e6},
-        Range{"fix_interval_s", scenario.fix_interval_s, 0.0, 1e6},
-        Range{"fix_position_std_m", scenario.fix_position_std_m, 0.0, 1e4},
-        Range{"fix_velocity_std_m_s", scenario.fix_velocity_std_m_s, 0.0, 60.0},
-        Range{"crossing_m", scenario.crossing_m, 0.0, 1e5},
-        Range{"ships", static_cast<double>(scenario.ships), 0.0, kMaxShips},
-        Range{"pings", static_cast<double>(scenario.pings), 0.0,
-              static_cast<double>(kMaxPings)}}) {
-    if (!(range.value >= range.low && range.value <= range.high)) {
-      return absl::InvalidArgumentError(
-          absl::StrFormat("%s=%g must be in [%g, %g]", range.name, range.value,
-                          range.low, range.high));
-    }
-  }
-  return absl::OkStatus();
+  FATHOM_RETURN_IF_ERROR(ValidateSonarFaults(scenario.faults));
+  FATHOM_RETURN_IF_ERROR(ValidateNavigation(scenario.navigation));
+  return CheckRanges(
+      {{"min_water_m", scenario.min_water_m, 0.1, 12'000.0},
+       {"ping_interval_s", scenario.ping_interval_s, 1e-3, 3'600.0},
+       {"passive_bearing_std_deg", scenario.passive_bearing_std_deg, 1e-6,
+        45.0},
+       {"passive_range_m", scenario.passive_range_m, 0.0, 2e7},
+       {"report_interval_s", scenario.report_interval_s, 1e-2, 1e6},
+       {"fix_interval_s", scenario.fix_interval_s, 0.0, 1e6},
+       {"fix_position_std_m", scenario.fix_position_std_m, 0.0, 1e4},
+       {"fix_velocity_std_m_s", scenario.fix_velocity_std_m_s, 0.0, 60.0},
+       {"crossing_m", scenario.crossing_m, 0.0, 1e5},
+       {"ships", static_cast<double>(scenario.ships), 0.0, kMaxShips},
+       {"pings", static_cast<double>(scenario.pings), 0.0,
+        static_cast<double>(kMaxPings)}});
 }
 
 PlaneBox BoxAround(const SurveyArea& area, double max_slant_range_m) {
@@ -104,7 +94,9 @@ Simulation::Simulation(const Scenario& scenario,
                        std::shared_ptr<const LocalTerrain> terrain)
     : scenario_(scenario),
       terrain_(std::move(terrain)),
+      navigation_(scenario.navigation, scenario.seed),
       sonar_random_(scenario.seed, RandomStream::kSonar),
+      fault_random_(scenario.seed, RandomStream::kSonarFaults),
       passive_random_(scenario.seed, RandomStream::kPassiveSonar) {}
 
 absl::Status Simulation::Plan() {
@@ -186,6 +178,7 @@ std::optional<Simulation::Message> Simulation::Next() {
     }
     now_s_ = due_s;
     state_ = vehicle_->StateAt(due_s);
+    navigation_.Advance(due_s);
     if (due == nullptr) {
       ++next_ping_;
       if (FillPing(ping_s)) return &ping_;
@@ -206,8 +199,12 @@ std::optional<Simulation::Message> Simulation::Next() {
 
 void Simulation::FillPose(const VehicleState& state,
                           v1::VehiclePose& pose) const {
-  const map::GeodeticPoint position =
-      terrain_->frame().ToGeodetic(state.north_m, state.east_m);
+  const PlanePoint error = navigation_.error();
+  const map::GeodeticPoint position = terrain_->frame().ToGeodetic(
+      state.north_m + error.north_m, state.east_m + error.east_m);
+  if (!scenario_.navigation.exact()) {
+    pose.set_position_std_m(navigation_.stated_std_m());
+  }
   pose.mutable_position()->set_latitude_deg(position.latitude_deg);
   pose.mutable_position()->set_longitude_deg(position.longitude_deg);
   pose.set_depth_m(state.depth_m);
@@ -222,8 +219,10 @@ bool Simulation::FillPing(double seconds) {
                             .east_m = state_.east_m,
                             .depth_m = state_.depth_m,
                             .course_rad = state_.course_rad};
-  const std::vector<SonarMeasurement> measurements =
-      MeasureForward(*terrain_, scenario_.sonar, sonar, sonar_random_);
+  const std::vector<SonarMeasurement> measurements = WithFaults(
+      scenario_.faults, sonar.depth_m,
+      MeasureForward(*terrain_, scenario_.sonar, sonar, sonar_random_),
+      fault_random_);
   ping_.Clear();
   ping_.set_activity_id(scenario_.activity_id);
   *ping_.mutable_time() = client::ToProto(TimeAt(seconds));

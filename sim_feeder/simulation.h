@@ -20,6 +20,7 @@
 #include "base/time.h"
 #include "fathom/v1/ingest_service.pb.h"
 #include "sim_feeder/local_terrain.h"
+#include "sim_feeder/navigation.h"
 #include "sim_feeder/random.h"
 #include "sim_feeder/scenario.h"
 #include "sim_feeder/ship.h"
@@ -87,7 +88,9 @@ class Simulation {
   std::optional<Vehicle> vehicle_;
   std::vector<Ship> ships_;
   std::vector<ShipSchedule> schedule_;
+  Navigation navigation_;
   Random sonar_random_;
+  Random fault_random_;
   Random passive_random_;
   double track_spacing_m_ = 0.0;
   std::uint64_t pings_planned_ = 0;

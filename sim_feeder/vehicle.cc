@@ -8,6 +8,7 @@
 #include "absl/strings/str_format.h"
 #include "base/status_macros.h"
 #include "sim_feeder/angles.h"
+#include "sim_feeder/named_range.h"
 
 namespace fathom::feeder {
 namespace {
@@ -17,26 +18,12 @@ constexpr double kMaxTrackM = 2.0e7;
 constexpr double kDepthStepM = 2.0;
 
 absl::Status ValidateVehicle(const VehicleOptions& options) {
-  struct Range {
-    const char* name;
-    double value;
-    double low;
-    double high;
-  };
-  for (const Range& range :
-       {Range{"speed_m_s", options.speed_m_s, 1e-3, 60.0},
-        Range{"turn_rate_deg_s", options.turn_rate_deg_s, 1e-3, 360.0},
-        Range{"altitude_m", options.altitude_m, 0.1, 12'000.0},
-        Range{"depth_m", options.depth_m.value_or(0.0), 0.0, 12'000.0},
-        Range{"least_depth_m", options.least_depth_m, 0.0, 12'000.0},
-        Range{"max_pitch_deg", options.max_pitch_deg, 0.1, 89.0}}) {
-    if (!(range.value >= range.low && range.value <= range.high)) {
-      return absl::InvalidArgumentError(
-          absl::StrFormat("%s=%g must be in [%g, %g]", range.name, range.value,
-                          range.low, range.high));
-    }
-  }
-  return absl::OkStatus();
+  return CheckRanges({{"speed_m_s", options.speed_m_s, 1e-3, 60.0},
+                      {"turn_rate_deg_s", options.turn_rate_deg_s, 1e-3, 360.0},
+                      {"altitude_m", options.altitude_m, 0.1, 12'000.0},
+                      {"depth_m", options.depth_m.value_or(0.0), 0.0, 12'000.0},
+                      {"least_depth_m", options.least_depth_m, 0.0, 12'000.0},
+                      {"max_pitch_deg", options.max_pitch_deg, 0.1, 89.0}});
 }
 
 }  // namespace

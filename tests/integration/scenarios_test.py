@@ -1,0 +1,115 @@
+"""The scenarios that ship, each against a live server of its own: they must
+meet their own expectations. bad_day's link is cut on top."""
+
+import json
+import pathlib
+import subprocess
+import unittest
+
+from live_server import DEADLINE_S, FEEDER, LiveTest, Server
+from replay_test import CuttingProxy
+
+SCENARIOS = pathlib.Path(__file__).parents[2] / "sim_feeder" / "scenarios"
+ETOPO = pathlib.Path("/usr/share/ferret-vis/data/etopo5.cdf")
+
+
+def run(*arguments):
+    return subprocess.run([FEEDER, "scenario", *map(str, arguments)],
+                          capture_output=True, text=True,
+                          timeout=4 * DEADLINE_S, check=False)
+
+
+@unittest.skipUnless(ETOPO.exists(), f"{ETOPO} is not installed")
+class Scenarios(LiveTest):
+
+    def server(self, name="m.fathom", side_nmi=1267):
+        return Server(self.folder / name, "--create", "--center", "41.6,-71.4",
+                      "--side-nmi", str(side_nmi))
+
+    def scenario(self, name, address, *flags):
+        done = run(SCENARIOS / f"{name}.yaml", "--server", address, "--json",
+                   *flags)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        result = json.loads(done.stdout)
+        self.assertEqual(result["missed"], [])
+        return result
+
+    def test_thesis_local_map(self):
+        with self.server() as server:
+            self.scenario("thesis_local_map", server.address)
+
+    def test_thesis_global_map(self):
+        with self.server() as server:
+            self.scenario("thesis_global_map", server.address)
+            # Section 6.1.2: what was local is leaves of the quadtree now.
+            self.assertGreater(server.status().global_map.leaves, 100)
+
+    def test_thesis_contact(self):
+        with self.server() as server:
+            self.scenario("thesis_contact", server.address)
+
+    def test_harbour_survey(self):
+        with self.server() as server:
+            self.scenario("harbour_survey", server.address)
+
+    def test_busy_strait(self):
+        with self.server() as server:
+            result = self.scenario("busy_strait", server.address)
+            self.assertEqual(len(result["survey"]["ships"]), 200)
+
+    def test_bad_day_with_a_link_that_is_cut(self):
+        with self.server() as server:
+            whole = self.scenario("bad_day", server.address, "--epoch", 1)
+            digest = server.status(digest=True).map_digest
+        self.assertGreater(sum(whole["survey"]["rejects"].values()), 0,
+                           "crosstalk is gated")
+        with self.server(name="cut.fathom") as server:
+            proxy = CuttingProxy(server.address, cuts=20, after_bytes=20_000)
+            self.addCleanup(proxy.close)
+            cut = self.scenario("bad_day", proxy.address, "--epoch", 1)
+            self.assertGreaterEqual(proxy.made, 10)
+            self.assertEqual(server.status(digest=True).map_digest, digest)
+            self.assertEqual(cut["evaluation"], whole["evaluation"])
+
+    def test_a_seed_repeats_a_run_byte_for_byte(self):
+        digests = []
+        for name, seed in (("a", 5), ("b", 5), ("c", 6)):
+            with self.server(name=f"{name}.fathom") as server:
+                self.scenario("thesis_local_map", server.address, "--seed",
+                              seed, "--epoch", 1)
+                digests.append(server.status(digest=True).map_digest)
+        self.assertEqual(digests[0], digests[1])
+        self.assertNotEqual(digests[0], digests[2])
+
+    def test_bad_files_end_with_one_clear_line(self):
+        good = (SCENARIOS / "bad_day.yaml").read_text()
+        missing = self.folder / "missing_raster.yaml"
+        missing.write_text(good.replace("truth: {", "truth: {raster: no.tif, "))
+        unknown = self.folder / "unknown.yaml"
+        unknown.write_text(good.replace("seed:", "sead:"))
+        for arguments, word in (
+                (["/nonexistent.yaml"], "cannot read /nonexistent.yaml"),
+                ([missing], "no.tif"),
+                ([unknown], "unknown.yaml:5: unknown key sead"),
+                ([SCENARIOS / "bad_day.yaml", "--server", "127.0.0.1:1"],
+                 "127.0.0.1:1")):
+            with self.subTest(arguments=arguments):
+                done = run(*arguments)
+                self.assertGreater(done.returncode, 0)
+                self.assertIn(word, done.stderr)
+                self.assertLessEqual(len(done.stderr.splitlines()), 2)
+
+    def test_an_expectation_that_is_missed_fails_the_run(self):
+        strict = self.folder / "strict.yaml"
+        strict.write_text(
+            (SCENARIOS / "thesis_local_map.yaml").read_text()
+            + "  - {figure: /measured/rmse_m, at_most: 0.001}\n")
+        with self.server() as server:
+            done = run(strict, "--server", server.address, "--json")
+            self.assertGreater(done.returncode, 0)
+            self.assertIn("/measured/rmse_m is ", done.stderr)
+            self.assertEqual(len(json.loads(done.stdout)["missed"]), 1)
+
+
+if __name__ == "__main__":
+    unittest.main()
