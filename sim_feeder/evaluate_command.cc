@@ -10,6 +10,7 @@
 #include "base/status_macros.h"
 #include "client/proto_time.h"
 #include "map/geodesy/ned_frame.h"
+#include "sim_feeder/evaluation_files.h"
 #include "sim_feeder/evaluation_report.h"
 #include "sim_feeder/random.h"
 
@@ -25,6 +26,8 @@ constexpr double kSettlingS = 60.0;
 struct Place {
   map::GeodeticPoint position;
   double truth_m;
+  double north_m;
+  double east_m;
 };
 
 absl::StatusOr<v1::QueryObstaclesResponse> Ask(
@@ -63,6 +66,12 @@ std::vector<float> CountDepths(const std::vector<Place>& places,
     const double mean_m = response.mean_depth_m(k);
     const double std_m = response.std_m(k);
     const v1::EvidenceKind kind = response.kind(k);
+    result.places.push_back({.north_m = places[i].north_m,
+                             .east_m = places[i].east_m,
+                             .truth_m = places[i].truth_m,
+                             .std_m = response.std_m(k),
+                             .mean_m = response.mean_depth_m(k),
+                             .kind = kind});
     // Drawn for every place, so that one answer does not shift the others.
     const double offset = random.Uniform(-3.0, 3.0);
     if (kind == v1::EVIDENCE_KIND_LAND) {
@@ -197,7 +206,9 @@ absl::StatusOr<DepthEvaluation> EvaluateDepth(const client::Client& client,
         continue;
       }
       places.push_back({.position = seabed.frame().ToGeodetic(north_m, east_m),
-                        .truth_m = *truth_m});
+                        .truth_m = *truth_m,
+                        .north_m = north_m,
+                        .east_m = east_m});
     }
     if (places.empty()) break;
     FATHOM_ASSIGN_OR_RETURN(
@@ -251,6 +262,10 @@ absl::Status Evaluate(const EvaluateOptions& options) {
                                         options.seed, options.points));
   FATHOM_ASSIGN_OR_RETURN(const ContactEvaluation contacts,
                           EvaluateContacts(*client, survey));
+  if (!options.out.empty()) {
+    FATHOM_RETURN_IF_ERROR(WriteEvaluation(options.out, truth.Describe(),
+                                           survey.area, depth, contacts));
+  }
   const std::string report = options.json ? EvaluationJson(depth, contacts)
                                           : EvaluationTable(depth, contacts);
   absl::PrintF("%s\n", report);

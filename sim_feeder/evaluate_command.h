@@ -47,7 +47,21 @@ struct EvaluateOptions {
   std::uint64_t seed = 1;
   // How many places, 1 to 10 M.
   std::uint64_t points = 20'000;
+  // Not empty: evaluation_files.h into this folder.
+  std::string out;
   bool json = false;
+};
+
+// One place: what is there, and what the map says.
+struct PlaceAnswer {
+  // In the plane about the area's south-west corner, metres.
+  double north_m = 0;
+  double east_m = 0;
+  double truth_m = 0;
+  // Not above 0 where the map states none.
+  float std_m = 0;
+  float mean_m = 0;
+  v1::EvidenceKind kind = v1::EVIDENCE_KIND_UNSPECIFIED;
 };
 
 struct DepthEvaluation {
@@ -62,6 +76,8 @@ struct DepthEvaluation {
   std::uint64_t land_right = 0;
   std::uint64_t land_wrong = 0;
   std::uint64_t near_contact = 0;
+  // Those with a truth, in the order asked.
+  std::vector<PlaceAnswer> places;
 };
 
 struct ContactEvaluation {

@@ -188,6 +188,13 @@ void AddVehicleAndSonar(CLI::App& app, Scenario& scenario) {
          "Between C4I fixes of one ship; 0: none");
 }
 
+void AddOut(CLI::App& app, std::string& folder) {
+  app.add_option("--out", folder,
+                 "Write evaluation.json, places.csv and evaluation.png into "
+                 "this folder")
+      ->type_name("FOLDER");
+}
+
 CLI::App* AddRun(CLI::App& app, RunOptions& run) {
   CLI::App* command =
       app.add_subcommand("run", "Survey an area and send what is heard");
@@ -322,6 +329,7 @@ CLI::App* AddScenario(CLI::App& app, ScenarioOptions& scenario) {
       ->capture_default_str();
   command->add_flag("--progress", scenario.show_progress,
                     "Show a progress bar");
+  AddOut(*command, scenario.out);
   command->add_flag("--json", scenario.json,
                     "Print survey, evaluation and what was missed, one line");
   return command;
@@ -344,6 +352,7 @@ CLI::App* AddEvaluate(CLI::App& app, EvaluateOptions& evaluate) {
       ->capture_default_str();
   command->add_option("--points", evaluate.points, "How many places")
       ->capture_default_str();
+  AddOut(*command, evaluate.out);
   command->add_flag("--json", evaluate.json, "Print one line of JSON");
   return command;
 }

@@ -9,6 +9,7 @@
 #include "base/status_macros.h"
 #include "client/client.h"
 #include "sim_feeder/evaluate_command.h"
+#include "sim_feeder/evaluation_files.h"
 #include "sim_feeder/evaluation_report.h"
 #include "sim_feeder/scenario_file.h"
 
@@ -41,6 +42,10 @@ absl::Status RunScenario(const ScenarioOptions& options) {
                     run.scenario.seed, scenario.evaluation_points));
   FATHOM_ASSIGN_OR_RETURN(const ContactEvaluation contacts,
                           EvaluateContacts(*client, survey));
+  if (!options.out.empty()) {
+    FATHOM_RETURN_IF_ERROR(WriteEvaluation(options.out, scenario.title,
+                                           survey.area, depth, contacts));
+  }
   const std::string evaluation = EvaluationJson(depth, contacts);
   FATHOM_ASSIGN_OR_RETURN(const std::vector<std::string> missed,
                           Missed(scenario.expectations, evaluation));

@@ -21,6 +21,8 @@ struct ScenarioOptions {
   // In place of the file's.
   std::optional<std::uint64_t> seed;
   double rate = 0.0;
+  // Not empty: evaluation_files.h into this folder.
+  std::string out;
   bool show_progress = false;
   bool json = false;
 };

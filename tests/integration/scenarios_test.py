@@ -1,8 +1,11 @@
 """The scenarios that ship, each against a live server of its own: they must
 meet their own expectations. bad_day's link is cut on top."""
 
+import csv
 import json
+import math
 import pathlib
+import struct
 import subprocess
 import unittest
 
@@ -50,7 +53,25 @@ class Scenarios(LiveTest):
 
     def test_harbour_survey(self):
         with self.server() as server:
-            self.scenario("harbour_survey", server.address)
+            out = self.folder / "evaluation"
+            result = self.scenario("harbour_survey", server.address, "--out",
+                                   out)
+            self.assertEqual(json.loads((out / "evaluation.json").read_text()),
+                             result["evaluation"])
+            with open(out / "places.csv", encoding="utf-8") as file:
+                rows = list(csv.DictReader(file))
+            self.assertEqual(len(rows), 20000)
+            # The figures are those of the places.
+            errors = [float(row["mean_m"]) - float(row["truth_m"])
+                      for row in rows if row["kind"] == "MEASURED"]
+            measured = result["evaluation"]["measured"]
+            self.assertEqual(len(errors), measured["count"])
+            self.assertAlmostEqual(
+                math.sqrt(math.fsum(e * e for e in errors) / len(errors)),
+                measured["rmse_m"], 3)
+            picture = (out / "evaluation.png").read_bytes()
+            # Width and height stand in a PNG's first chunk.
+            self.assertEqual(struct.unpack(">II", picture[16:24]), (1600, 640))
 
     def test_busy_strait(self):
         with self.server() as server:
