@@ -432,6 +432,9 @@ void WriteLimits(v1::Limits* out) {
   out->set_max_sources(SourceLedger::kMaxSources);
   out->set_max_searches(kMaxSearches);
   out->set_max_search_cells(kMaxSearchCells);
+  out->set_max_trajectory_watchers(kMaxTrajectoryWatchers);
+  out->set_max_watch_cells(kMaxWatchCells);
+  out->set_max_kept_changes(kMaxKeptChanges);
 }
 
 }  // namespace fathom::server

@@ -164,15 +164,6 @@ absl::Status HeaderMissing() {
   return status;
 }
 
-absl::Status NotYet(std::string_view rpc) {
-  absl::Status status = absl::UnimplementedError(absl::StrFormat(
-      "%s is part of fathom.v1 but this version of the server (see "
-      "GetMissionStatus) does not offer it yet",
-      rpc));
-  AttachReason(status, "NOT_IMPLEMENTED");
-  return status;
-}
-
 std::optional<FieldViolation> ViolationOf(const absl::Status& status) {
   const auto bad_request = DetailOf<google::rpc::BadRequest>(status);
   if (!bad_request.has_value() || bad_request->field_violations_size() == 0) {

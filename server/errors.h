@@ -68,9 +68,6 @@ absl::Status NoSuchContact(std::string_view source_id,
 // FAILED_PRECONDITION: the first message of an import is not a header.
 absl::Status HeaderMissing();
 
-// UNIMPLEMENTED: the call is in the contract, this server lacks it.
-absl::Status NotYet(std::string_view rpc);
-
 // What BadRequest and ErrorInfo of an InvalidField say.
 struct FieldViolation {
   std::string path;

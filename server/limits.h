@@ -163,8 +163,37 @@ inline constexpr size_t kMaxSearches = 256;
 // Threads for them, apart from the bulk streams': an avoidance loop must not
 // queue behind 64 exports.
 inline constexpr size_t kSearchThreads = 2;
-// Concurrent watchers (issue of the watch RPCs).
+// WatchRegion, WatchContacts and WatchTrajectory calls at once: some screens
+// and planners for each of kMaxIngestStreams vehicles. Each holds one message
+// (of a region 6 kB) and, of a region, one bit for kWatchTileSide squared
+// cells.
 inline constexpr int kMaxWatchers = 256;
+// The part of them that watch trajectories: each may cost kMaxWatchCells cells
+// after every change.
+inline constexpr int kMaxTrajectoryWatchers = 32;
+// Most cells of the map that a watched trajectory reads: 60 ms, so that the
+// alert comes within 100 ms. (10 km at 10 m with 50 m to each side: 10 000.)
+inline constexpr uint64_t kMaxWatchCells = 200'000;
+// Blocks and tiles of the map, and contacts, that are remembered as changed,
+// each once, for watchers that lag or resume: 2.5 MB. A survey that breaks new
+// ground, ten blocks of 32 m a second, goes on for 25 minutes.
+inline constexpr size_t kMaxKeptChanges = 16'384;
+// More changed at once (a chart, a transfer) count as one change of everywhere.
+inline constexpr size_t kMaxAreasAtOnce = 4096;
+// Side of the tiles in which a watched region is told, cells: a ping changes
+// few of them, and 16 x 16 cells are made in 0.3 ms.
+inline constexpr uint32_t kWatchTileSide = 16;
+// Changes are looked for at most so often, so that twenty views of the map
+// share the work.
+inline constexpr std::chrono::milliseconds kWatchInterval{5};
+// How often a watcher hears that nothing he watches has changed, while the map
+// goes on.
+inline constexpr std::chrono::milliseconds kWatchProgressInterval{1000};
+// A trajectory is judged anew at most so often.
+inline constexpr std::chrono::milliseconds kTrajectoryInterval{20};
+// Changes are followed for so long after the last watcher has gone, so that one
+// who was cut off finds what he missed.
+inline constexpr std::chrono::milliseconds kWatchLinger{60'000};
 // Queries that wait for a min_revision.
 inline constexpr size_t kMaxRevisionWaiters = 1024;
 // Longest wait for a min_revision when the client sets no deadline.

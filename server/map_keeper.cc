@@ -88,6 +88,17 @@ std::shared_ptr<const map::ObstacleMapView> MapKeeper::View() const {
   return views_.Get();
 }
 
+std::shared_ptr<const map::ObstacleMapView> MapKeeper::NextView(
+    uint64_t revision, RevisionGate::Deadline until) const {
+  {
+    MutexLock lock(published_mutex_);
+    while (published_revision_ <= revision &&
+           published_.WaitUntil(published_mutex_, until)) {
+    }
+  }
+  return views_.Get();
+}
+
 StorageState MapKeeper::storage_state() const {
   MutexLock lock(mutex_);
   return storage_;
@@ -449,6 +460,11 @@ void MapKeeper::ApplyContact(IngestMessage& message, MessageOutcome& outcome,
 MapKeeper::ViewPtr MapKeeper::Publish() {
   ViewPtr view = map_->View();
   views_.Publish(view);
+  {
+    MutexLock lock(published_mutex_);
+    published_revision_ = view->revision();
+    published_.NotifyAll();
+  }
   gate_.Reach(view->revision());
   return view;
 }

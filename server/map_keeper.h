@@ -140,6 +140,11 @@ class MapKeeper {
   // The newest view. Costs a lock and a reference count.
   std::shared_ptr<const map::ObstacleMapView> View() const;
 
+  // The newest view, once it is newer than `revision`, at `until` at the
+  // latest. Blocks.
+  std::shared_ptr<const map::ObstacleMapView> NextView(
+      uint64_t revision, RevisionGate::Deadline until) const;
+
   // See RevisionGate::Wait.
   bool WaitForRevision(uint64_t revision, RevisionGate::Deadline deadline,
                        RevisionGate::Callback callback) {
@@ -298,6 +303,9 @@ class MapKeeper {
 
   // Published by the mapper thread (and the constructor).
   Published<map::ObstacleMapView> views_;
+  mutable Mutex published_mutex_;
+  mutable CondVar published_;
+  uint64_t published_revision_ FATHOM_GUARDED_BY(published_mutex_) = 0;
 
   mutable Mutex mutex_;
   CondVar queue_changed_;

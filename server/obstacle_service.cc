@@ -4,6 +4,7 @@
 #include <deque>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "base/status_macros.h"
 #include "map/obstacle_map/check_trajectory.h"
@@ -14,6 +15,10 @@
 #include "server/field_checks.h"
 #include "server/region.h"
 #include "server/search_call.h"
+#include "server/watch_contacts.h"
+#include "server/watch_region.h"
+#include "server/watch_stream.h"
+#include "server/watch_trajectory.h"
 
 namespace fathom::server {
 namespace {
@@ -108,6 +113,25 @@ class RegionStream final
   v1::GetRegionResponse response_;
   std::atomic<bool> gone_{false};
 };
+
+// Starts a watch if it could be made and a slot of each of `slots` is free.
+template <typename Watch>
+grpc::ServerWriteReactor<typename Watch::Response>* StartWatch(
+    ServerContext& context, Workers& workers, absl::StatusOr<Watch> watch,
+    const std::vector<CallSlots*>& slots) {
+  using Failed = FailedStream<typename Watch::Response>;
+  if (!watch.ok()) return new Failed(watch.status());
+  for (size_t i = 0; i < slots.size(); ++i) {
+    if (slots[i]->Take()) continue;
+    for (size_t taken = 0; taken < i; ++taken) slots[taken]->GiveBack();
+    return new Failed(TooManyCalls(i == 0 ? "watches" : "trajectory watches",
+                                   slots[i]->limit()));
+  }
+  const auto stream = std::make_shared<WatchStream<Watch>>(
+      context, workers, *std::move(watch), slots);
+  stream->Begin();
+  return stream.get();
+}
 
 absl::StatusOr<std::deque<v1::GetContactHistoryResponse>> ReadHistory(
     storage::MissionFile& file, const v1::GetContactHistoryRequest& request) {
@@ -342,21 +366,27 @@ grpc::ServerUnaryReactor* ObstacleService::FindNearestObstacle(
 }
 
 grpc::ServerWriteReactor<v1::WatchRegionResponse>* ObstacleService::WatchRegion(
-    grpc::CallbackServerContext*, const v1::WatchRegionRequest*) {
-  return new FailedStream<v1::WatchRegionResponse>(NotYet("WatchRegion"));
+    grpc::CallbackServerContext*, const v1::WatchRegionRequest* request) {
+  return StartWatch(
+      context_, context_.region_watches,
+      RegionWatch::Create(*request, context_.changes.log(), context_.clock),
+      {&context_.watch_calls});
 }
 
 grpc::ServerWriteReactor<v1::WatchContactsResponse>*
 ObstacleService::WatchContacts(grpc::CallbackServerContext*,
-                               const v1::WatchContactsRequest*) {
-  return new FailedStream<v1::WatchContactsResponse>(NotYet("WatchContacts"));
+                               const v1::WatchContactsRequest* request) {
+  return StartWatch<ContactsWatch>(
+      context_, context_.contact_watches,
+      ContactsWatch(*request, context_.changes.log()), {&context_.watch_calls});
 }
 
 grpc::ServerWriteReactor<v1::WatchTrajectoryResponse>*
 ObstacleService::WatchTrajectory(grpc::CallbackServerContext*,
-                                 const v1::WatchTrajectoryRequest*) {
-  return new FailedStream<v1::WatchTrajectoryResponse>(
-      NotYet("WatchTrajectory"));
+                                 const v1::WatchTrajectoryRequest* request) {
+  return StartWatch(context_, context_.trajectory_watches,
+                    TrajectoryWatch::Create(*request, context_.changes.log()),
+                    {&context_.watch_calls, &context_.trajectory_watch_calls});
 }
 
 }  // namespace fathom::server

@@ -47,8 +47,7 @@ double Wrap(double longitude_deg) {
 }  // namespace
 
 absl::StatusOr<Region> Region::Create(const v1::GetRegionRequest& request,
-                                      Time now) {
-  const FieldPath root;
+                                      Time now, const FieldPath& root) {
   Region region;
   region.now_ = now;
   const FieldPath south_west_path(root, "south_west");
@@ -89,15 +88,16 @@ absl::StatusOr<Region> Region::Create(const v1::GetRegionRequest& request,
       break;
     case v1::MAP_LAYER_GLOBAL:
       if (!region.activity_id_.empty()) {
-        return InvalidField("layer",
+        return InvalidField(FieldPath(root, "layer").ToString(),
                             "an activity_id is given, which is not in the "
                             "global layer");
       }
       region.layers_ = map::LayerChoice::kGlobalOnly;
       break;
     default:
-      return InvalidField("layer", absl::StrFormat("%d is not a known MapLayer",
-                                                   request.layer()));
+      return InvalidField(
+          FieldPath(root, "layer").ToString(),
+          absl::StrFormat("%d is not a known MapLayer", request.layer()));
   }
 
   const DegreeLengths lengths =
@@ -121,7 +121,7 @@ absl::StatusOr<Region> Region::Create(const v1::GetRegionRequest& request,
   const double columns =
       std::max(1.0, std::ceil(width_deg / region.longitude_step_deg_ - 1e-9));
   if (rows * columns > static_cast<double>(kMaxRegionCells)) {
-    return LimitExceeded("resolution_m cells",
+    return LimitExceeded(FieldPath(root, "resolution_m").ToString() + " cells",
                          static_cast<uint64_t>(std::min(rows * columns, 1e18)),
                          kMaxRegionCells);
   }
@@ -159,16 +159,18 @@ std::optional<map::SeabedEstimate> Region::SeabedAt(
   return view_->SeabedAt(point, layers_);
 }
 
-void Region::Corners(double north_deg, double west_deg, uint32_t row,
-                     uint32_t columns,
+map::GeodeticPoint Region::PointAt(double row, double column) const {
+  return {.latitude_deg = std::max(
+              north_west_.latitude_deg - row * latitude_step_deg_, -90.0),
+          .longitude_deg =
+              Wrap(north_west_.longitude_deg + column * longitude_step_deg_)};
+}
+
+void Region::Corners(uint32_t row, uint32_t first_column, uint32_t columns,
                      std::vector<map::GeodeticPoint>& out) const {
   out.clear();
-  const double latitude_deg =
-      std::max(north_deg - row * latitude_step_deg_, -90.0);
   for (uint32_t column = 0; column <= columns; ++column) {
-    out.push_back(
-        {.latitude_deg = latitude_deg,
-         .longitude_deg = Wrap(west_deg + column * longitude_step_deg_)});
+    out.push_back(PointAt(row, first_column + column));
   }
 }
 
@@ -204,28 +206,28 @@ void Region::WriteCell(const map::GeodeticPoint& center, float shoalest_m,
   tile->set_shoalest_m(i, shoalest_m);
 }
 
-Region::Step Region::Next(const std::atomic<bool>& stop,
-                          v1::GetRegionResponse* out) {
-  if (next_row_ >= rows_) return Step::kEnd;
-  const uint32_t rows = std::min(kRegionTileSide, rows_ - next_row_);
-  const uint32_t columns = std::min(kRegionTileSide, columns_ - next_column_);
-  out->Clear();
-  out->set_total_rows(rows_);
-  out->set_total_columns(columns_);
-  WriteStamp(*view_, out->mutable_stamp());
-  v1::RegionTile* tile = out->mutable_tile();
+void Region::Close() {
+  shoalest_.reset();
+  activity_ = nullptr;
+  view_.reset();
+}
+
+bool Region::Read(const Block& block, const std::atomic<bool>& stop,
+                  v1::RegionTile* tile) {
+  const uint32_t rows = block.rows;
+  const uint32_t columns = block.columns;
   const double north_deg =
-      north_west_.latitude_deg - next_row_ * latitude_step_deg_;
+      north_west_.latitude_deg - block.first_row * latitude_step_deg_;
   const double west_deg =
-      north_west_.longitude_deg + next_column_ * longitude_step_deg_;
+      north_west_.longitude_deg + block.first_column * longitude_step_deg_;
   tile->mutable_north_west()->set_latitude_deg(north_deg);
   tile->mutable_north_west()->set_longitude_deg(Wrap(west_deg));
   tile->set_latitude_step_deg(latitude_step_deg_);
   tile->set_longitude_step_deg(longitude_step_deg_);
   tile->set_rows(rows);
   tile->set_columns(columns);
-  tile->set_first_row(next_row_);
-  tile->set_first_column(next_column_);
+  tile->set_first_row(block.first_row);
+  tile->set_first_column(block.first_column);
   const int cells = static_cast<int>(rows * columns);
   tile->mutable_depth_m()->Resize(cells, kNaN);
   tile->mutable_std_m()->Resize(cells, kNaN);
@@ -236,28 +238,39 @@ Region::Step Region::Next(const std::atomic<bool>& stop,
   std::vector<map::GeodeticPoint> north;
   std::vector<map::GeodeticPoint> south;
   std::vector<float> shoalest_m;
-  Corners(north_deg, west_deg, 0, columns, south);
+  Corners(block.first_row, block.first_column, columns, south);
   shoalest_->StartBlock();
   for (uint32_t row = 0; row < rows; ++row) {
     north.swap(south);
-    Corners(north_deg, west_deg, row + 1, columns, south);
-    if (!shoalest_->NextRow(north, south, stop, shoalest_m)) {
-      return Step::kStopped;
-    }
+    Corners(block.first_row + row + 1, block.first_column, columns, south);
+    if (!shoalest_->NextRow(north, south, stop, shoalest_m)) return false;
     for (uint32_t column = 0; column < columns; ++column) {
-      const map::GeodeticPoint center = {
-          .latitude_deg =
-              std::max(north_deg - (row + 0.5) * latitude_step_deg_, -90.0),
-          .longitude_deg =
-              Wrap(west_deg + (column + 0.5) * longitude_step_deg_)};
-      WriteCell(center, shoalest_m[column],
-                static_cast<int>(row * columns + column), tile);
+      WriteCell(PointAt(block.first_row + row + 0.5,
+                        block.first_column + column + 0.5),
+                shoalest_m[column], static_cast<int>(row * columns + column),
+                tile);
     }
   }
-  next_column_ += columns;
+  return true;
+}
+
+Region::Step Region::Next(const std::atomic<bool>& stop,
+                          v1::GetRegionResponse* out) {
+  if (next_row_ >= rows_) return Step::kEnd;
+  const Block block = {
+      .first_row = next_row_,
+      .first_column = next_column_,
+      .rows = std::min(kRegionTileSide, rows_ - next_row_),
+      .columns = std::min(kRegionTileSide, columns_ - next_column_)};
+  out->Clear();
+  out->set_total_rows(rows_);
+  out->set_total_columns(columns_);
+  WriteStamp(*view_, out->mutable_stamp());
+  if (!Read(block, stop, out->mutable_tile())) return Step::kStopped;
+  next_column_ += block.columns;
   if (next_column_ >= columns_) {
     next_column_ = 0;
-    next_row_ += rows;
+    next_row_ += block.rows;
   }
   return Step::kBlock;
 }

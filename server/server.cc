@@ -197,6 +197,7 @@ void Server::Drain() {
   impl_->health.SetNotServing();
   impl_->context.ingest_calls.Drain();
   impl_->context.import_calls.Drain();
+  impl_->context.changes.WakeAll();
   impl_->context.keeper.StopWaiting();
   impl_->server->Shutdown(std::chrono::system_clock::now() + kDrainTime);
   impl_->server->Wait();

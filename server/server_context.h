@@ -14,6 +14,7 @@
 #include "grpcpp/server_context.h"
 #include "grpcpp/support/server_callback.h"
 #include "server/call_registry.h"
+#include "server/change_feed.h"
 #include "server/errors.h"
 #include "server/limits.h"
 #include "server/map_keeper.h"
@@ -38,6 +39,15 @@ struct ServerContext {
   Workers workers{kWorkerThreads};
   // Trajectories and nearest obstacles.
   Workers searches{kSearchThreads};
+  // Watches, a thread for each kind: none waits for another kind, and all
+  // together leave what other cores there are to the rest. A region's tile
+  // takes 0.3 ms, a contact 10 us, a trajectory up to 60 ms.
+  Workers region_watches{1};
+  Workers contact_watches{1};
+  Workers trajectory_watches{1};
+  ChangeFeed changes{keeper};
+  CallSlots watch_calls{kMaxWatchers};
+  CallSlots trajectory_watch_calls{kMaxTrajectoryWatchers};
   CallSlots bulk_calls{kMaxBulkStreams};
   CallSlots search_calls{kMaxSearches};
   // SaveMission and VerifyMission: each reads the whole file and holds another

@@ -213,18 +213,6 @@ class MainJob(LiveTest):
             self.assertEqual(ask(server, 240, 125).answer.state,
                              types.OBSTACLE_STATE_UNKNOWN)
 
-    def test_what_is_not_built_yet_says_so(self):
-        with self.new_mission() as server:
-            for call, request in [
-                (server.obstacle.WatchRegion, obstacle.WatchRegionRequest()),
-                (server.obstacle.WatchContacts,
-                 obstacle.WatchContactsRequest()),
-                (server.obstacle.WatchTrajectory,
-                 obstacle.WatchTrajectoryRequest()),
-            ]:
-                self.assert_status(grpc.StatusCode.UNIMPLEMENTED, call,
-                                   request)
-
 
 if __name__ == "__main__":
     unittest.main()
