@@ -73,6 +73,27 @@ void ReadArea(YamlMap map, RunOptions& run) {
   }
 }
 
+std::vector<Shape> ReadShapes(YamlMap& truth) {
+  std::vector<Shape> shapes;
+  for (YamlMap& map : truth.Children("shapes")) {
+    Shape shape;
+    std::size_t kind = 0;
+    map.ReadName("kind", kind,
+                 {"slope", "ridge", "channel", "pinnacle", "wreck", "wall"});
+    shape.kind = static_cast<ShapeKind>(kind);
+    if (!map.Has("kind")) map.Refuse("kind", "is missing");
+    map.Read("north_m", shape.north_m, -1e5, 1e5);
+    map.Read("east_m", shape.east_m, -1e5, 1e5);
+    map.Read("azimuth_deg", shape.azimuth_deg, -360, 360);
+    map.Read("length_m", shape.length_m, 0.1, 1e5);
+    map.Read("width_m", shape.width_m, 0.1, 1e5);
+    const double least_m = shape.kind == ShapeKind::kSlope ? -1000 : 0.01;
+    map.Read("height_m", shape.height_m, least_m, 1000);
+    shapes.push_back(shape);
+  }
+  return shapes;
+}
+
 void ReadTruth(YamlMap map, TruthOptions& truth) {
   map.Read("raster", truth.path);
   std::size_t positive = 0;
@@ -84,6 +105,12 @@ void ReadTruth(YamlMap map, TruthOptions& truth) {
   map.Read("relief_length_m", truth.relief.correlation_length_m, 1, 1e6);
   map.Read("relief_seed", truth.relief.seed);
   map.Read("relief_cell_m", truth.fine_cell_m, 0.1, 1000);
+  map.Read("flat_depth_m", truth.flat_depth_m, 1, 12'000);
+  if (truth.flat_depth_m.has_value() && !truth.path.empty()) {
+    map.Refuse("flat_depth_m", "and raster are both stated");
+  }
+  truth.shapes = ReadShapes(map);
+  map.Read("shape_cell_m", truth.shape_cell_m, 0.1, 1000);
 }
 
 void ReadVehicle(YamlMap map, Scenario& scenario) {

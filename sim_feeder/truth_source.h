@@ -9,11 +9,14 @@
 #define FATHOM_SIM_FEEDER_TRUTH_SOURCE_H_
 
 #include <memory>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "sim_feeder/local_terrain.h"
 #include "sim_feeder/raster_terrain.h"
+#include "sim_feeder/shapes.h"
 #include "sim_feeder/survey_area.h"
 
 namespace fathom::feeder {
@@ -27,6 +30,11 @@ struct TruthOptions {
   map::GeodeticPoint center = {.latitude_deg = 41.2, .longitude_deg = -71.4};
   double fine_cell_m = 10.0;
   ReliefOptions relief;
+  // A level seabed of this depth in place of either; the area must be stated.
+  std::optional<double> flat_depth_m;
+  // Set on whichever seabed it is, with cells of shape_cell_m.
+  std::vector<Shape> shapes;
+  double shape_cell_m = 2.0;
 };
 
 class TruthSource {
@@ -35,7 +43,7 @@ class TruthSource {
   static absl::StatusOr<TruthSource> Load(const TruthOptions& options);
 
   // The best square for a survey (survey_area.h); with ETOPO5 within 20 km of
-  // the centre.
+  // the centre. Errors: as PickArea; FAILED_PRECONDITION for a level seabed.
   absl::StatusOr<PickedArea> Pick(double side_m, double cell_size_m,
                                   double min_depth_m) const;
 
@@ -48,10 +56,14 @@ class TruthSource {
   std::string Describe() const;
 
  private:
+  explicit TruthSource(const TruthOptions& options) : options_(options) {}
   TruthSource(const TruthOptions& options, Terrain terrain);
 
+  absl::StatusOr<std::shared_ptr<const LocalTerrain>> WithoutShapes(
+      const SurveyArea& area, const PlaneBox& box) const;
+
   TruthOptions options_;
-  std::shared_ptr<const Terrain> terrain_;
+  std::shared_ptr<const Terrain> terrain_;  // Null: level.
 };
 
 }  // namespace fathom::feeder
