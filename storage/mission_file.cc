@@ -324,6 +324,10 @@ absl::Status MissionFile::Impl::Commit(const Batch& batch) {
   // The batch is safe in the log whatever becomes of the copying; an I/O
   // error there is told by the next Commit.
   const std::uint64_t log_bytes = writer_.LogBytes();
+  {
+    MutexLock lock(status_mutex_);
+    status_.log_starved = log_bytes > kWalKeepBytes;
+  }
   if (log_bytes < kWalCheckpointBytes) {
     copy_at_bytes_ = kWalCheckpointBytes;
   } else if (log_bytes >= copy_at_bytes_) {

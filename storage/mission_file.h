@@ -53,7 +53,9 @@ inline constexpr int kOldestSchemaVersion = 5;
 // a second.
 inline constexpr std::uint64_t kWalCheckpointBytes = 32ull << 20;
 
-// Once the log has been copied it is cut down to this (journal_size_limit).
+// Once the log has been copied it is cut down to this (journal_size_limit). It
+// grows beyond only while a reader holds an old state: MissionFile's own reads
+// of history are short, those of SaveCopy and Verify last as long as a start.
 inline constexpr std::uint64_t kWalKeepBytes = 64ull << 20;
 
 // The file at a glance.
@@ -66,6 +68,8 @@ struct MissionFileStatus {
   // Every change up to this revision is on the disk.
   std::uint64_t durable_revision = 0;
   std::uint64_t checkpoint_revision = 0;
+  // The log is beyond kWalKeepBytes: a reader keeps it from being copied.
+  bool log_starved = false;
 };
 
 // What SaveCopy wrote.

@@ -186,6 +186,13 @@ absl::StatusOr<Connection> Connection::Open(const std::string& path,
   if (result != SQLITE_OK) {
     return connection.Error(result, absl::StrFormat("open %s", path));
   }
+  // SQLite takes what it may only read without a word, and fails later.
+  if (mode != Mode::kReadOnly && sqlite3_db_readonly(database, "main") == 1) {
+    return absl::FailedPreconditionError(absl::StrFormat(
+        "open %s: it is read-only for this process; give it the right to "
+        "write, or work on a copy",
+        path));
+  }
   sqlite3_extended_result_codes(database, 1);
   sqlite3_db_config(database, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
   // A file from elsewhere must not run functions that its schema names.

@@ -94,7 +94,8 @@ class Connection {
   // Opens `path`; nothing is read yet. Pages are checked where the file says so
   // (checked_pages.h). SQLite never checkpoints by itself:
   // neither by the log's size nor when the connection closes (but see
-  // CheckpointOnClose).
+  // CheckpointOnClose). Errors: FAILED_PRECONDITION for a file that is to be
+  // written and may only be read; those above.
   static absl::StatusOr<Connection> Open(const std::string& path, Mode mode);
 
   // Makes every page of the database a checked one (checked_pages.h): of a new

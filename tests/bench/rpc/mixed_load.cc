@@ -93,8 +93,9 @@ class PingLoad {
   const grpc::Status& status() const { return status_; }
 
  private:
-  // A second of the quickest stream; more would measure our own queue.
-  static constexpr std::size_t kMostWaiting = 2000;
+  // About what a quick stream has under way between two commits; more would
+  // measure our own queue.
+  static constexpr std::size_t kMostWaiting = 1000;
 
   void Write() {
     grpc::ClientContext context;

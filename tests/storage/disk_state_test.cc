@@ -1,0 +1,201 @@
+// The mission file and the disk around it: long reads, read-only files, damaged
+// pages that are to be written.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <random>
+#include <string>
+
+#include "storage/mission_file.h"
+#include "storage/offline.h"
+#include "storage/restore.h"
+#include "storage/sqlite.h"
+#include "tests/storage/event_script.h"
+#include "tests/storage/sample_records.h"
+#include "tests/storage/temp_dir.h"
+#include "tests/testing/status_matchers.h"
+
+namespace fathom::storage {
+namespace {
+
+using ::fathom::testing::IsOk;
+using ::fathom::testing::StatusIs;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+std::string ReadAll(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+// Batches of about 8 MiB of journal.
+class LargeBatches {
+ public:
+  LargeBatches() {
+    std::mt19937 random(1);
+    for (int i = 0; i < 50; ++i) {
+      batch_.journal.push_back(
+          {0, PingRecord{.source = {"sonar"},
+                         .epoch = 1,
+                         .sequence = 0,
+                         .ping = SamplePing(random, "leg", i, 20'000)}});
+    }
+  }
+  const Batch& Next() {
+    for (JournalRecord& record : batch_.journal) {
+      record.revision = ++revision_;
+      std::get<PingRecord>(record.event).sequence = revision_;
+    }
+    return batch_;
+  }
+
+ private:
+  Batch batch_;
+  std::uint64_t revision_ = 0;
+};
+
+TEST(MissionLog, StaysBoundedWhileNobodyReadsForLong) {
+  const TempDir dir;
+  FATHOM_ASSERT_OK_AND_ASSIGN(
+      const auto file, MissionFile::Create(dir.File("m"), SampleMetadata()));
+  LargeBatches batches;
+  std::uint64_t written = 0;
+  for (int i = 0; i < 30; ++i) {
+    ASSERT_THAT(file->Commit(batches.Next()), IsOk());
+    const MissionFileStatus status = file->Status();
+    EXPECT_LE(status.wal_bytes, kWalKeepBytes);
+    EXPECT_FALSE(status.log_starved);
+    written = status.file_bytes + status.wal_bytes;
+  }
+  EXPECT_GT(written, 2 * kWalKeepBytes);
+}
+
+TEST(MissionLog, AReaderThatStarvesItIsToldAndItShrinksAfterwards) {
+  const TempDir dir;
+  FATHOM_ASSERT_OK_AND_ASSIGN(
+      const auto file, MissionFile::Create(dir.File("m"), SampleMetadata()));
+  LargeBatches batches;
+  ASSERT_THAT(file->Commit(batches.Next()), IsOk());
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(
+        Connection reader,
+        Connection::Open(dir.File("m"), Connection::Mode::kReadOnly));
+    ASSERT_THAT(reader.Execute("BEGIN"), IsOk());
+    ASSERT_THAT(reader.QueryInt("SELECT count(*) FROM journal"), IsOk());
+    int commits = 0;
+    while (!file->Status().log_starved) {
+      ASSERT_THAT(file->Commit(batches.Next()), IsOk());
+      ASSERT_LT(++commits, 100);
+    }
+    EXPECT_GT(file->Status().wal_bytes, kWalKeepBytes);
+    // Ingest went on all the while; the reader saw its own state.
+    EXPECT_GT(commits, 1);
+  }
+  // The next copy is due 32 MiB after the last try.
+  int commits = 0;
+  while (file->Status().log_starved) {
+    ASSERT_THAT(file->Commit(batches.Next()), IsOk());
+    ASSERT_LT(++commits, 20);
+  }
+  ASSERT_THAT(file->Commit(batches.Next()), IsOk());
+  EXPECT_LE(file->Status().wal_bytes, kWalKeepBytes);
+}
+
+// Opened by a process without rights, whose status comes through a pipe (root
+// may write everything: the child gives that up).
+TEST(ReadOnlyMission, IsRefusedWithTheReasonAndUntouched) {
+  const TempDir dir;
+  const std::string path = dir.File("m");
+  { ASSERT_THAT(MissionFile::Create(path, SampleMetadata()), IsOk()); }
+  const std::string before = ReadAll(path);
+  ASSERT_EQ(chmod(path.c_str(), 0444), 0);
+  ASSERT_EQ(chmod(dir.path().c_str(), 0777), 0);
+  int pipe_ends[2];
+  ASSERT_EQ(pipe(pipe_ends), 0);
+  const pid_t child = fork();
+  if (child == 0) {
+    if (getuid() == 0 && setuid(65534) != 0) _exit(2);
+    const std::string told = MissionFile::Open(path).status().ToString();
+    const ssize_t size = write(pipe_ends[1], told.data(), told.size());
+    _exit(size == static_cast<ssize_t>(told.size()) ? 0 : 3);
+  }
+  close(pipe_ends[1]);
+  char told[4096] = {};
+  ASSERT_GE(read(pipe_ends[0], told, sizeof told - 1), 0);
+  close(pipe_ends[0]);
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_EQ(WEXITSTATUS(status), 0);
+  EXPECT_THAT(std::string(told),
+              AllOf(HasSubstr("FAILED_PRECONDITION"), HasSubstr(path),
+                    HasSubstr("read-only")));
+  EXPECT_EQ(ReadAll(path), before);
+}
+
+// A tile's page is damaged, and the next checkpoint is to write the tile.
+TEST(DamagedPage, IsNeverWrittenOverUnseen) {
+  const TempDir dir;
+  const std::string path = dir.File("m");
+  map::ObstacleMap map(*OptionsOf(SampleMetadata()));
+  EventScript script(map, nullptr);
+  std::int64_t page = 0;
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto file,
+                                MissionFile::Create(path, SampleMetadata()));
+    for (int i = 0; i < 110; ++i) {
+      script.Step();
+      ASSERT_THAT(file->Commit(script.batch()), IsOk());
+      script.Committed();
+    }
+    ASSERT_THAT(file->Close(), IsOk());
+  }
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(
+        Connection connection,
+        Connection::Open(path, Connection::Mode::kReadOnly));
+    FATHOM_ASSERT_OK_AND_ASSIGN(
+        page, connection.QueryInt(
+                  "SELECT rootpage FROM sqlite_schema WHERE name = 'tile'"));
+  }
+  std::string content = ReadAll(path);
+  content[static_cast<std::size_t>(page - 1) * 8192 + 4000] ^= 1;
+  std::ofstream(path, std::ios::binary) << content;
+
+  FATHOM_ASSERT_OK_AND_ASSIGN(auto file, MissionFile::Open(path));
+  FATHOM_ASSERT_OK_AND_ASSIGN(Loaded loaded, file->Load());
+  EXPECT_FALSE(loaded.damage.empty());
+  FATHOM_ASSERT_OK_AND_ASSIGN(
+      const RestoredMap restored,
+      RestoreMap(std::move(loaded), *OptionsOf(SampleMetadata())));
+  EventScript onward(*restored.map, restored.checkpoint);
+  // The journal is elsewhere: events are still taken.
+  onward.Step();
+  ASSERT_THAT(file->Commit(onward.batch()), IsOk());
+  onward.Committed();
+  // The checkpoint has to read the page it writes to.
+  while (!onward.batch().checkpoint.has_value()) onward.Step();
+  const absl::Status written = file->Commit(onward.batch());
+  EXPECT_THAT(written,
+              StatusIs(absl::StatusCode::kDataLoss, HasSubstr("checksum")));
+  // What was acknowledged is there, and a repair brings the mission back.
+  ASSERT_THAT(file->Close(), IsOk());
+  file.reset();
+  FATHOM_ASSERT_OK_AND_ASSIGN(const Repair repair,
+                              RepairMission(path, dir.File("repaired")));
+  EXPECT_FALSE(repair.left_out.empty());
+  EXPECT_EQ(repair.revision, 111u);
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto mended,
+                              MissionFile::Open(dir.File("repaired")));
+  FATHOM_ASSERT_OK_AND_ASSIGN(Loaded whole, mended->Load());
+  EXPECT_TRUE(whole.damage.empty());
+}
+
+}  // namespace
+}  // namespace fathom::storage
