@@ -206,6 +206,12 @@ grpc::ServerUnaryReactor* MissionService::GetMissionStatus(
   storage->set_journal_records(state.journal_records);
   storage->set_durable_revision(state.durable_revision);
   storage->set_fault(state.fault);
+  if (file.log_starved) {
+    storage->set_warning(absl::StrFormat(
+        "the write-ahead log has %d MiB: a long read (verify, save) keeps it "
+        "from being copied; it shrinks when that ends",
+        file.wal_bytes >> 20));
+  }
   for (const std::string& damage : context_.damage) {
     if (storage->damage_size() >= kMaxDamageTold) break;
     storage->add_damage(damage);

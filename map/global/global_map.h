@@ -192,7 +192,7 @@ class GlobalMap {
   // bit. In another square each cell of ours takes four or more points' answers
   // by moments, so that no leaf is missed; a shore in a measured cell is a
   // hazard. What lies outside our square is left out. If `degraded` is not 0
-  // the map is to be thrown away: max_cells was reached. About 3 us a leaf.
+  // the map is to be thrown away: max_cells was reached.
   WriteSummary MergeMap(const GlobalMapView& other,
                         const MapMergeOptions& options);
 

@@ -27,8 +27,27 @@ std::string ReadAll(const std::string& path) {
   return std::string(std::istreambuf_iterator<char>(file), {});
 }
 
-// tests/golden/make made it with the last program of version 5. Its digest then
-// is not asked for: replayed reports are fused as this program fuses them.
+// What tests/golden/make puts into every golden mission. Its digest then is not
+// asked for: replayed reports are fused as this program fuses them.
+void ExpectGolden(MissionFile& file) {
+  FATHOM_ASSERT_OK_AND_ASSIGN(
+      const RestoredMap restored,
+      RestoreMap(*file.Load(), *OptionsOf(file.metadata())));
+  EXPECT_EQ(restored.refused_records, 0u);
+  const auto view = restored.map->View();
+  // A chart, 2 starts, 60 pings, 1 completion, 20 reports, 1 drop.
+  EXPECT_EQ(view->revision(), 1u + 2 + 60 + 1 + 20 + 1);
+  EXPECT_EQ(view->activities().size(), 2u);
+  EXPECT_EQ(view->contacts().size(), 2u);
+  EXPECT_EQ(view->contacts().live_count(), 1u);
+  // The nine cells of the first activity, and the chart about them.
+  EXPECT_GT(view->global().known_leaf_count(), 9u);
+  FATHOM_ASSERT_OK_AND_ASSIGN(const Proof proof, file.Verify());
+  EXPECT_THAT(proof.problems, IsEmpty());
+  EXPECT_EQ(proof.history_rows, 21u);
+}
+
+// Made with the last program of version 5.
 TEST(Migrate, MissionOfVersion5IsBackedUpAndBroughtToThisOne) {
   const TempDir dir;
   const std::string path = dir.File("m");
@@ -37,26 +56,22 @@ TEST(Migrate, MissionOfVersion5IsBackedUpAndBroughtToThisOne) {
   std::filesystem::copy_file(golden, path);
   for (int time = 0; time < 2; ++time) {
     FATHOM_ASSERT_OK_AND_ASSIGN(const auto file, MissionFile::Open(path));
-    FATHOM_ASSERT_OK_AND_ASSIGN(
-        const RestoredMap restored,
-        RestoreMap(*file->Load(), *OptionsOf(file->metadata())));
-    EXPECT_EQ(restored.refused_records, 0u);
-    const auto view = restored.map->View();
-    // A chart, 2 starts, 60 pings, 1 completion, 20 reports, 1 drop.
-    EXPECT_EQ(view->revision(), 1u + 2 + 60 + 1 + 20 + 1);
-    EXPECT_EQ(view->activities().size(), 2u);
-    EXPECT_EQ(view->contacts().size(), 2u);
-    EXPECT_EQ(view->contacts().live_count(), 1u);
-    // The nine cells of the first activity, and the chart about them.
-    EXPECT_GT(view->global().known_leaf_count(), 9u);
-    FATHOM_ASSERT_OK_AND_ASSIGN(const Proof proof, file->Verify());
-    EXPECT_THAT(proof.problems, IsEmpty());
-    EXPECT_EQ(proof.history_rows, 21u);
+    ExpectGolden(*file);
     ASSERT_THAT(file->Close(), IsOk());
   }
   EXPECT_EQ(ReadAll(path)[63], kSchemaVersion);
   EXPECT_EQ(ReadAll(path)[20], kPageChecksumBytes);
   EXPECT_EQ(ReadAll(path + ".v5.bak")[63], 5);
+}
+
+TEST(Migrate, MissionOfVersion6OpensAsItIs) {
+  const TempDir dir;
+  const std::string path = dir.File("m");
+  std::filesystem::copy_file(
+      FATHOM_SOURCE_DIR "/tests/golden/mission-v6.fathom", path);
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto file, MissionFile::Open(path));
+  ExpectGolden(*file);
+  EXPECT_FALSE(std::filesystem::exists(path + ".v6.bak"));
 }
 
 }  // namespace
