@@ -177,6 +177,35 @@ absl::StatusOr<std::vector<v1::ContactEstimate>> Client::GetContactHistory(
   return estimates;
 }
 
+std::unique_ptr<RegionWatch> Client::WatchRegion(
+    const v1::WatchRegionRequest& request, const WatchOptions& options) const {
+  return std::make_unique<RegionWatch>(
+      [stub = obstacle_](auto* context, const auto& asked) {
+        return stub->WatchRegion(context, asked);
+      },
+      request, options);
+}
+
+std::unique_ptr<ContactsWatch> Client::WatchContacts(
+    const v1::WatchContactsRequest& request,
+    const WatchOptions& options) const {
+  return std::make_unique<ContactsWatch>(
+      [stub = obstacle_](auto* context, const auto& asked) {
+        return stub->WatchContacts(context, asked);
+      },
+      request, options);
+}
+
+std::unique_ptr<TrajectoryWatch> Client::WatchTrajectory(
+    const v1::WatchTrajectoryRequest& request,
+    const WatchOptions& options) const {
+  return std::make_unique<TrajectoryWatch>(
+      [stub = obstacle_](auto* context, const auto& asked) {
+        return stub->WatchTrajectory(context, asked);
+      },
+      request, options);
+}
+
 absl::StatusOr<std::unique_ptr<PingStream>> Client::OpenPingStream(
     const IngestStreamOptions& options) const {
   return PingStream::Open(channel_, options);

@@ -45,6 +45,7 @@
 #include "client/ping_stream.h"
 #include "client/prior_writer.h"
 #include "client/region.h"
+#include "client/watch.h"
 #include "fathom/v1/ingest_service.grpc.pb.h"
 #include "fathom/v1/mission_service.grpc.pb.h"
 #include "fathom/v1/obstacle_service.grpc.pb.h"
@@ -113,6 +114,18 @@ class Client {
   absl::StatusOr<std::vector<v1::ContactEstimate>> GetContactHistory(
       const v1::GetContactHistoryRequest& request) const;
 
+  // Begin to watch; see watch.h. Whether the server takes the watch shows with
+  // the first Next. No deadline: a watch lasts until it is cancelled.
+  std::unique_ptr<RegionWatch> WatchRegion(
+      const v1::WatchRegionRequest& request,
+      const WatchOptions& options = {}) const;
+  std::unique_ptr<ContactsWatch> WatchContacts(
+      const v1::WatchContactsRequest& request = {},
+      const WatchOptions& options = {}) const;
+  std::unique_ptr<TrajectoryWatch> WatchTrajectory(
+      const v1::WatchTrajectoryRequest& request,
+      const WatchOptions& options = {}) const;
+
   // --- Evidence (IngestService) ---
 
   // Opens a stream of pings, or of contact reports; see ping_stream.h and
@@ -160,7 +173,8 @@ class Client {
   const std::string address_;
   const ClientOptions options_;
   const std::shared_ptr<grpc::Channel> channel_;
-  const std::unique_ptr<v1::ObstacleService::Stub> obstacle_;
+  // Shared with the watches that it opened.
+  const std::shared_ptr<v1::ObstacleService::Stub> obstacle_;
   const std::unique_ptr<v1::IngestService::Stub> ingest_;
   const std::unique_ptr<v1::MissionService::Stub> mission_;
 };
