@@ -1,13 +1,12 @@
 // fathom contacts: the moving obstacles.
 
-#include <cmath>
-#include <limits>
 #include <memory>
 #include <optional>
 
 #include "absl/strings/str_format.h"
 #include "base/status_macros.h"
 #include "client/cli/arguments.h"
+#include "client/cli/contact_text.h"
 #include "client/cli/exit_code.h"
 #include "client/cli/session.h"
 #include "client/cli/text.h"
@@ -26,27 +25,6 @@ absl::StatusOr<std::pair<std::string, std::string>> ParseKey(
         text)));
   }
   return std::make_pair(text.substr(0, slash), text.substr(slash + 1));
-}
-
-constexpr char kColumns[] =
-    "contact                  class        status   position                 "
-    "  +- m  m/s  course  reports  time\n";
-
-std::string Row(const v1::ContactEstimate& c) {
-  // Covariance: nn, ne, n.vn, n.ve, ee, ... (types.proto).
-  const double position_std_m =
-      c.covariance_size() == 10
-          ? std::sqrt((c.covariance(0) + c.covariance(4)) / 2)
-          : std::numeric_limits<double>::quiet_NaN();
-  double course_deg =
-      std::atan2(c.velocity_east_m_s(), c.velocity_north_m_s()) * 180 / M_PI;
-  if (course_deg < 0) course_deg += 360;
-  return absl::StrFormat(
-      "%-24s %-12s %-8s %-24s %6.1f %4.1f  %5.0f  %7d  %s\n",
-      c.source_id() + "/" + c.contact_id(), ClassText(c.contact_class()),
-      StatusText(c.status()), PlaceText(c.position()), position_std_m,
-      std::hypot(c.velocity_north_m_s(), c.velocity_east_m_s()), course_deg,
-      c.report_count(), TimeText(c.time()));
 }
 
 absl::Status List(const Session& session, const std::string& time_text,
@@ -70,9 +48,9 @@ absl::Status List(const Session& session, const std::string& time_text,
     Print("no contact\n");
     return absl::OkStatus();
   }
-  Print(kColumns);
+  Print(std::string(kContactColumns));
   for (const v1::ContactEstimate& contact : response.contacts()) {
-    Print(Row(contact));
+    Print(ContactRow(contact));
   }
   return absl::OkStatus();
 }
@@ -101,8 +79,9 @@ absl::Status History(const Session& session, const std::string& key_text,
     PrintJson({{"estimates", list}});
     return absl::OkStatus();
   }
-  Print(kColumns);
-  for (const v1::ContactEstimate& estimate : estimates) Print(Row(estimate));
+  Print(std::string(kContactColumns));
+  for (const v1::ContactEstimate& estimate : estimates)
+    Print(ContactRow(estimate));
   return absl::OkStatus();
 }
 

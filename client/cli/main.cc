@@ -26,12 +26,13 @@ Examples:
   fathom nearest --at 41.6,-71.4 --depth-m 20
   fathom activity start bay --center 41.6,-71.4 --size-m 1000 --cell-m 10
   fathom contacts list --time +10min
+  fathom watch contacts
   fathom export --activity bay --out bay.tif
   fathom render --out map.png
   fathom VERB --help            every verb explains itself
 
-With --json a verb prints one JSON document on standard output; progress and
-remarks go to standard error.
+With --json a verb prints one JSON document on standard output (watch: one a
+line); progress and remarks go to standard error.
 
 Exit codes:
   0  done
@@ -100,6 +101,7 @@ int Main(int argc, char** argv) {
   AddCheck(app, session);
   AddNearest(app, session);
   AddContacts(app, session);
+  AddWatch(app, session);
   AddPrior(app, session);
   AddExport(app, session);
   AddRender(app, session);

@@ -87,6 +87,12 @@ void PrintJson(const nlohmann::ordered_json& document) {
   Print(document.dump(2, ' ', false, replace) + "\n");
 }
 
+void PrintJsonLine(const nlohmann::ordered_json& document) {
+  const auto replace = nlohmann::ordered_json::error_handler_t::replace;
+  Print(document.dump(-1, ' ', false, replace) + "\n");
+  std::fflush(stdout);
+}
+
 void Print(const std::string& text) {
   std::fwrite(text.data(), 1, text.size(), stdout);
 }

@@ -51,6 +51,8 @@ nlohmann::ordered_json ToJson(const google::protobuf::Message& message);
 
 // One document on standard output, indented.
 void PrintJson(const nlohmann::ordered_json& document);
+// One document on one line, at once: for those that come one after the other.
+void PrintJsonLine(const nlohmann::ordered_json& document);
 // printf to standard output.
 void Print(const std::string& text);
 // A line to standard error: progress and decisions, never results.
@@ -64,6 +66,7 @@ void AddQuery(CLI::App& app, Session& session);
 void AddCheck(CLI::App& app, Session& session);
 void AddNearest(CLI::App& app, Session& session);
 void AddContacts(CLI::App& app, Session& session);
+void AddWatch(CLI::App& app, Session& session);
 void AddPrior(CLI::App& app, Session& session);
 void AddExport(CLI::App& app, Session& session);
 void AddRender(CLI::App& app, Session& session);
