@@ -59,6 +59,7 @@ class Proxy:
                 end.shutdown(socket.SHUT_RDWR)
             except OSError:
                 pass
+            end.close()
 
     def close(self):
         self.listener.close()
@@ -153,8 +154,9 @@ class WatchCommand(LiveTest):
             shown.wait(timeout=DEADLINE_S)
             self.assertIn("# 5.0 m (shoalest)   . 30.0 m", text)
             picture = text.split("\x1b[2J")[1]
-            self.assertEqual(sum(line.count("#")
-                                 for line in picture.splitlines()[:24]), 1)
+            # A cell of the map touches 2 x 2 cells of the answer at most.
+            shoals = sum(line.count("#") for line in picture.splitlines()[:24])
+            self.assertIn(shoals, range(1, 5))
 
     def test_a_trajectory_alerts(self):
         with self.new_mission() as server:
