@@ -7,10 +7,12 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "base/time.h"
 #include "sim_feeder/forward_sonar.h"
 #include "sim_feeder/navigation.h"
+#include "sim_feeder/ship.h"
 #include "sim_feeder/sonar_faults.h"
 #include "sim_feeder/survey_area.h"
 #include "sim_feeder/vehicle.h"
@@ -43,6 +45,8 @@ struct Scenario {
   // Ships about the vehicle.
   int ships = 3;
   double crossing_m = 120.0;
+  // Besides these.
+  std::vector<Ship> scripted_ships = {};
   // Bearing noise of the passive sonar, 1 sigma degrees, in (0, 45].
   double passive_bearing_std_deg = 1.5;
   // How far it hears, metres; 0: any distance, as in the thesis (3.6.1). On a

@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_format.h"
 #include "base/status_macros.h"
+#include "sim_feeder/angles.h"
 #include "sim_feeder/yaml_reader.h"
 
 namespace fathom::feeder {
@@ -148,9 +149,51 @@ void ReadSonar(YamlMap map, Scenario& scenario) {
   map.Read("tide_m", faults.tide_m, -20, 20);
 }
 
+// One ship: where it starts, and its legs one after the other.
+Ship ReadShip(YamlMap& map) {
+  Ship ship;
+  std::size_t kind = 0;
+  map.Read("id", ship.id);
+  map.ReadName("class", kind,
+               {"vessel", "small_craft", "deep_draught", "submerged",
+                "drifting", "unknown"});
+  ship.contact_class = std::array{
+      v1::CONTACT_CLASS_VESSEL,       v1::CONTACT_CLASS_SMALL_CRAFT,
+      v1::CONTACT_CLASS_DEEP_DRAUGHT, v1::CONTACT_CLASS_SUBMERGED,
+      v1::CONTACT_CLASS_DRIFTING,     v1::CONTACT_CLASS_UNKNOWN}[kind];
+  map.Read("north_m", ship.start.north_m, -1e6, 1e6);
+  map.Read("east_m", ship.start.east_m, -1e6, 1e6);
+  double at_s = 0;
+  for (YamlMap& leg : map.Children("legs")) {
+    double speed_m_s = 0;
+    double course_deg = 0;
+    double duration_s = 0;
+    leg.Read("speed_m_s", speed_m_s, 0, 60);
+    leg.Read("course_deg", course_deg, -360, 360);
+    leg.Read("duration_s", duration_s, 0.1, 1e7);
+    const CourseChange change = {
+        .at_s = at_s,
+        .north_m_s = speed_m_s * std::cos(course_deg * kRadiansPerDegree),
+        .east_m_s = speed_m_s * std::sin(course_deg * kRadiansPerDegree)};
+    if (at_s == 0) {
+      ship.north_m_s = change.north_m_s;
+      ship.east_m_s = change.east_m_s;
+    } else {
+      ship.changes.push_back(change);
+    }
+    if (duration_s == 0) leg.Refuse("duration_s", "is missing");
+    at_s += duration_s;
+  }
+  if (ship.id.empty()) map.Refuse("id", "is missing");
+  return ship;
+}
+
 void ReadContacts(YamlMap map, Scenario& scenario) {
   map.Read("ships", scenario.ships, 0, 1000);
   map.Read("crossing_m", scenario.crossing_m, 0, 1e5);
+  for (YamlMap& ship : map.Children("scripted")) {
+    scenario.scripted_ships.push_back(ReadShip(ship));
+  }
   map.Read("bearing_std_deg", scenario.passive_bearing_std_deg, 1e-6, 45);
   map.Read("passive_range_m", scenario.passive_range_m, 0, kWholeEarthM);
   map.Read("report_interval_s", scenario.report_interval_s, 1e-2, 1e6);

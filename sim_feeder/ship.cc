@@ -54,6 +54,25 @@ PlanePoint StartOfCrossing(const Vehicle& vehicle, const Ship& ship,
 
 }  // namespace
 
+Ship::Motion Ship::MotionAt(double seconds) const {
+  Motion motion = {
+      .place = start, .north_m_s = north_m_s, .east_m_s = east_m_s};
+  double since_s = 0.0;
+  const auto go_until = [&](double until_s) {
+    motion.place.north_m += (until_s - since_s) * motion.north_m_s;
+    motion.place.east_m += (until_s - since_s) * motion.east_m_s;
+    since_s = until_s;
+  };
+  for (const CourseChange& change : changes) {
+    if (change.at_s > seconds) break;
+    go_until(change.at_s);
+    motion.north_m_s = change.north_m_s;
+    motion.east_m_s = change.east_m_s;
+  }
+  go_until(seconds);
+  return motion;
+}
+
 std::vector<Ship> MakeShips(const LocalTerrain& terrain, const SurveyArea& area,
                             const Vehicle& vehicle, const ShipOptions& options,
                             Random& random) {

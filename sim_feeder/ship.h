@@ -1,5 +1,6 @@
 // Moving obstacles: points with constant velocity, independent of the vehicle
-// (Nervegna 2002, section 3.6.1).
+// (Nervegna 2002, section 3.6.1); or as a scenario scripts them: turns and
+// stops.
 
 #ifndef FATHOM_SIM_FEEDER_SHIP_H_
 #define FATHOM_SIM_FEEDER_SHIP_H_
@@ -16,6 +17,14 @@
 
 namespace fathom::feeder {
 
+// A velocity from a time on.
+struct CourseChange {
+  // Since the start of the simulation, seconds, > 0.
+  double at_s = 0.0;
+  double north_m_s = 0.0;
+  double east_m_s = 0.0;
+};
+
 struct Ship {
   // Contact id, "ship-1" and so on.
   std::string id = {};
@@ -24,12 +33,19 @@ struct Ship {
   PlanePoint start = {};
   double north_m_s = 0.0;
   double east_m_s = 0.0;
+  // In order of time; a stop is one of 0 m/s.
+  std::vector<CourseChange> changes = {};
 
   // Where it is `seconds` after the start.
-  PlanePoint PlaceAt(double seconds) const {
-    return {.north_m = start.north_m + seconds * north_m_s,
-            .east_m = start.east_m + seconds * east_m_s};
-  }
+  PlanePoint PlaceAt(double seconds) const { return MotionAt(seconds).place; }
+
+  struct Motion {
+    PlanePoint place;
+    double north_m_s = 0.0;
+    double east_m_s = 0.0;
+  };
+  // That and how it moves there: O(changes).
+  Motion MotionAt(double seconds) const;
 };
 
 struct ShipOptions {

@@ -141,6 +141,8 @@ absl::Status Simulation::Plan() {
                       .duration_s = std::max(1.0, duration_s()),
                       .crossing_m = scenario_.crossing_m},
                      ship_random);
+  ships_.insert(ships_.end(), scenario_.scripted_ships.begin(),
+                scenario_.scripted_ships.end());
   for (std::size_t i = 0; i < ships_.size(); ++i) {
     // Ships take turns within an interval.
     const double turn =
@@ -269,7 +271,8 @@ bool Simulation::FillRangeBearing(const Ship& ship, double seconds) {
 void Simulation::FillFix(const Ship& ship, double seconds) {
   const double position_std_m = scenario_.fix_position_std_m;
   const double velocity_std_m_s = scenario_.fix_velocity_std_m_s;
-  PlanePoint place = ship.PlaceAt(seconds);
+  const Ship::Motion motion = ship.MotionAt(seconds);
+  PlanePoint place = motion.place;
   place.north_m += passive_random_.Normal(0.0, position_std_m);
   place.east_m += passive_random_.Normal(0.0, position_std_m);
   report_.Clear();
@@ -281,9 +284,9 @@ void Simulation::FillFix(const Ship& ship, double seconds) {
       terrain_->frame().ToGeodetic(place.north_m, place.east_m);
   fix.mutable_position()->set_latitude_deg(position.latitude_deg);
   fix.mutable_position()->set_longitude_deg(position.longitude_deg);
-  fix.set_velocity_north_m_s(ship.north_m_s +
+  fix.set_velocity_north_m_s(motion.north_m_s +
                              passive_random_.Normal(0.0, velocity_std_m_s));
-  fix.set_velocity_east_m_s(ship.east_m_s +
+  fix.set_velocity_east_m_s(motion.east_m_s +
                             passive_random_.Normal(0.0, velocity_std_m_s));
   fix.set_position_std_m(position_std_m);
   fix.set_velocity_std_m_s(velocity_std_m_s);

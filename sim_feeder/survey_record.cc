@@ -40,6 +40,12 @@ Json ShipJson(const Ship& ship, const SurveyRecord& record) {
   const map::NedFrame frame(record.area.south_west);
   const PlanePoint end =
       ship.PlaceAt(ToSeconds(record.end_time - record.start_time));
+  Json changes = Json::array();
+  for (const CourseChange& change : ship.changes) {
+    changes.push_back({{"at_s", change.at_s},
+                       {"velocity_north_m_s", change.north_m_s},
+                       {"velocity_east_m_s", change.east_m_s}});
+  }
   return {
       {"contact_id", ship.id},
       {"contact_class", v1::ContactClass_Name(ship.contact_class)},
@@ -49,7 +55,8 @@ Json ShipJson(const Ship& ship, const SurveyRecord& record) {
       {"start_north_m", ship.start.north_m},
       {"start_east_m", ship.start.east_m},
       {"velocity_north_m_s", ship.north_m_s},
-      {"velocity_east_m_s", ship.east_m_s}};
+      {"velocity_east_m_s", ship.east_m_s},
+      {"course_changes", changes}};
 }
 
 absl::StatusOr<Ship> ShipFrom(const Json& json) {
@@ -64,6 +71,11 @@ absl::StatusOr<Ship> ShipFrom(const Json& json) {
                 .east_m = json.at("start_east_m")};
   ship.north_m_s = json.at("velocity_north_m_s");
   ship.east_m_s = json.at("velocity_east_m_s");
+  for (const Json& change : json.value("course_changes", Json::array())) {
+    ship.changes.push_back({.at_s = change.at("at_s"),
+                            .north_m_s = change.at("velocity_north_m_s"),
+                            .east_m_s = change.at("velocity_east_m_s")});
+  }
   return ship;
 }
 

@@ -76,7 +76,8 @@ class Scenarios(LiveTest):
     def test_busy_strait(self):
         with self.server() as server:
             result = self.scenario("busy_strait", server.address)
-            self.assertEqual(len(result["survey"]["ships"]), 200)
+            # And the ferry.
+            self.assertEqual(len(result["survey"]["ships"]), 201)
 
     def test_bad_day_with_a_link_that_is_cut(self):
         with self.server() as server:

@@ -100,6 +100,34 @@ TEST(ParseScenario, NamesFileLineKeyAndRange) {
   EXPECT_EQ(MessageOf(""), "day.yaml:1: is no map of keys and values");
 }
 
+TEST(ParseScenario, LegsOfAShipFollowEachOther) {
+  FATHOM_ASSERT_OK_AND_ASSIGN(
+      const ScenarioFile file,
+      ParseScenario(std::string(kGood) +
+                        "contacts:\n"
+                        "  scripted:\n"
+                        "    - id: ferry\n"
+                        "      class: small_craft\n"
+                        "      north_m: 100\n"
+                        "      legs:\n"
+                        "        - {speed_m_s: 5, course_deg: 90, duration_s: "
+                        "60}\n"
+                        "        - {duration_s: 40}\n"
+                        "        - {speed_m_s: 2, course_deg: 0, duration_s: "
+                        "10}\n",
+                    "day.yaml"));
+  ASSERT_EQ(file.run.scenario.scripted_ships.size(), 1U);
+  const Ship& ferry = file.run.scenario.scripted_ships[0];
+  EXPECT_EQ(ferry.contact_class, v1::CONTACT_CLASS_SMALL_CRAFT);
+  // 5 m/s east for 60 s, still for 40 s, 2 m/s north for good.
+  EXPECT_NEAR(ferry.PlaceAt(30).east_m, 150, 1e-9);
+  EXPECT_NEAR(ferry.PlaceAt(80).east_m, 300, 1e-9);
+  EXPECT_NEAR(ferry.PlaceAt(80).north_m, 100, 1e-9);
+  EXPECT_NEAR(ferry.PlaceAt(130).north_m, 160, 1e-9);
+  EXPECT_NEAR(ferry.MotionAt(130).north_m_s, 2, 1e-9);
+  EXPECT_EQ(ferry.MotionAt(80).east_m_s, 0);
+}
+
 TEST(LoadScenario, TheShippedOnesAreGood) {
   int files = 0;
   for (const auto& entry : std::filesystem::directory_iterator(

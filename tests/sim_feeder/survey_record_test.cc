@@ -29,7 +29,8 @@ SurveyRecord Example() {
                    .contact_class = v1::CONTACT_CLASS_SMALL_CRAFT,
                    .start = {.north_m = 10.0, .east_m = -20.0},
                    .north_m_s = 1.5,
-                   .east_m_s = -2.5}};
+                   .east_m_s = -2.5,
+                   .changes = {{.at_s = 20, .north_m_s = 0, .east_m_s = 1}}}};
   record.pings = 600;
   record.measurements = 9000;
   record.pings_durable = 600;
@@ -47,6 +48,8 @@ TEST(SurveyRecord, ComesBackAsItWas) {
   FATHOM_ASSERT_OK_AND_ASSIGN(const SurveyRecord back, ParseSurveyRecord(json));
   EXPECT_EQ(ToJson(back), json);
   EXPECT_EQ(back.ships[0].PlaceAt(10.0).north_m, 25.0);
+  EXPECT_EQ(back.ships[0].PlaceAt(30.0).north_m,
+            back.ships[0].PlaceAt(20.0).north_m);
   EXPECT_EQ(back.end_time, record.end_time);
 }
 
