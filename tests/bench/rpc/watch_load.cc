@@ -113,7 +113,8 @@ absl::Status Feed(const Client& server, int per_s,
   return stream->Finish();
 }
 
-// A kilometre along the surveyed area at 3 m depth, from now on.
+// Across the surveyed area at 3 m depth within the next 20 s: a contact half
+// way is predicted so far ahead with metres of uncertainty.
 v1::WatchTrajectoryRequest Path() {
   v1::WatchTrajectoryRequest request;
   v1::Trajectory* trajectory = request.mutable_trajectory();
@@ -126,7 +127,7 @@ v1::WatchTrajectoryRequest Path() {
     waypoint->mutable_position()->set_longitude_deg(kLongitudeDeg + 1e-4 * k);
     waypoint->set_depth_m(3);
     *waypoint->mutable_time() = client::ToProto(
-        SystemClock().Now() + std::chrono::seconds(3600 + 10 * k));
+        SystemClock().Now() + std::chrono::milliseconds(200 * k));
   }
   return request;
 }
@@ -145,12 +146,12 @@ absl::StatusOr<double> AwaitAlert(client::TrajectoryWatch& watch, bool alert,
 }
 
 absl::Status Alerts(const Client& server, int rounds, nlohmann::json& report) {
-  const auto watch = server.WatchTrajectory(Path());
-  FATHOM_RETURN_IF_ERROR(
-      AwaitAlert(*watch, false, SteadyClock::now()).status());
   std::vector<double> raised_ms;
   std::vector<double> cleared_ms;
   for (int round = 0; round < rounds; ++round) {
+    const auto watch = server.WatchTrajectory(Path());
+    FATHOM_RETURN_IF_ERROR(
+        AwaitAlert(*watch, false, SteadyClock::now()).status());
     const std::string contact = "intruder-" + std::to_string(round);
     v1::ReportContactsRequest reports;
     *reports.add_reports() =
