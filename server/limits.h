@@ -20,6 +20,20 @@ namespace fathom::server {
 // 3.0 MB, a 512 x 512 chart tile with stds 2.4 MB; 8 MiB holds both twice.
 inline constexpr int kMaxMessageBytes = 8 * 1024 * 1024;
 
+// Memory for what comes and goes on all connections, bytes: messages that are
+// not yet whole, answers that are not yet read. Past it gRPC lets idle
+// connections go (their clients come back), then ends streams until it fits;
+// it does so beside the traffic, so a flood from many connections at once holds
+// more for a moment (tests/integration/hostile_test.py).
+inline constexpr size_t kMaxTransportBytes = 128 * 1024 * 1024;
+// Calls at once on one connection, as HTTP/2 tells the client, which waits
+// with more: all streams that the limits below allow, and 128 short calls.
+inline constexpr int kMaxStreamsPerConnection = 512;
+// A connection that was silent so long is asked for a sign of life, and is
+// closed when none comes: a vehicle out of reach must not hold its streams.
+inline constexpr std::chrono::seconds kKeepaliveTime{20};
+inline constexpr std::chrono::seconds kKeepaliveTimeout{10};
+
 // Most measurements in one ping. The SeaBat 8101 of the thesis has 101 beams;
 // multibeams of today have 1024; 4096 leaves room and keeps a ping at 64 kB.
 inline constexpr size_t kMaxBeamsPerPing = 4096;

@@ -166,6 +166,17 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(
   builder.AddListeningPort(options.address, credentials, &impl->port);
   // Without this two servers would share a port and split the calls.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
+                             kMaxStreamsPerConnection);
+  builder.AddChannelArgument(
+      GRPC_ARG_KEEPALIVE_TIME_MS,
+      static_cast<int>(std::chrono::milliseconds(kKeepaliveTime).count()));
+  builder.AddChannelArgument(
+      GRPC_ARG_KEEPALIVE_TIMEOUT_MS,
+      static_cast<int>(std::chrono::milliseconds(kKeepaliveTimeout).count()));
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+  builder.SetResourceQuota(
+      grpc::ResourceQuota("fathomd").Resize(kMaxTransportBytes));
   builder.SetMaxReceiveMessageSize(kMaxMessageBytes);
   // Answers are bounded by our limits, not by gRPC's.
   builder.SetMaxSendMessageSize(-1);
