@@ -6,6 +6,7 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 #include <optional>
 
 #include "tests/accuracy/contact_runs.h"
@@ -107,6 +108,39 @@ Consistency Measure(const Encounter& encounter, map::FilterKind filter) {
   return result;
 }
 
+// rmse_m of a filter that is told the true direction and distance for its
+// weights (not for its measurement): all that is left to it is the noise and
+// the accelerations, so what it cannot do nobody can. Its own covariances, for
+// they are then right, over the same truths.
+double ToldM(const Encounter& encounter) {
+  const auto reports = static_cast<std::size_t>(encounter.reports);
+  const double bearing_std_rad =
+      encounter.bearing_std_deg * std::numbers::pi / 180;
+  double square_m2 = 0;
+  for (std::uint64_t run = 1; run <= kSets * kRuns; ++run) {
+    map::TrackState state;
+    const std::vector<Moment> moments = Run(encounter, run);
+    for (std::size_t i = 0; i < reports; ++i) {
+      const Eigen::Vector2d away =
+          moments[i].truth.head<2>() - moments[i].vehicle;
+      const map::PositionMeasurement measured =
+          map::ConvertPlain({.range_m = away.norm(),
+                             .azimuth_rad = std::atan2(away.y(), away.x()),
+                             .range_std_m = encounter.range_std_m,
+                             .azimuth_std_rad = bearing_std_rad});
+      state = i == 0 ? map::FirstState(measured, encounter.velocity_std_m_s)
+                     : map::Update(map::FilterKind::kFourState,
+                                   map::Predict(state, encounter.step_s,
+                                                encounter.process_noise_m2_s3),
+                                   measured)
+                           .state;
+      if (2 * i >= reports) square_m2 += state.P(0, 0) + state.P(1, 1);
+    }
+  }
+  const double half = std::floor(static_cast<double>(reports) / 2);
+  return std::sqrt(square_m2 / kSets / kRuns / half);
+}
+
 }  // namespace
 
 nlohmann::json ContactConsistencyFigures() {
@@ -116,6 +150,7 @@ nlohmann::json ContactConsistencyFigures() {
         Measure(scene.encounter, map::FilterKind::kFourState);
     const Consistency theirs =
         Measure(scene.encounter, map::FilterKind::kPerAxis);
+    const double told_m = ToldM(scene.encounter);
     rows.push_back({{"scene", scene.name},
                     {"nees", ours.nees},
                     {"nees_inside_percent", 100 * ours.nees_inside},
@@ -127,6 +162,9 @@ nlohmann::json ContactConsistencyFigures() {
                     {"per_axis_nees", theirs.nees},
                     {"per_axis_gated", theirs.gated},
                     {"rmse_ratio", ours.rmse_m / theirs.rmse_m},
+                    {"told_rmse_m", told_m},
+                    {"over_told", ours.rmse_m / told_m},
+                    {"told_ratio", told_m / theirs.rmse_m},
                     {"bearing_std_deg", scene.encounter.bearing_std_deg}});
   }
   return rows;

@@ -67,14 +67,26 @@ struct TargetTrack {
   int begun = 0;
 };
 
+// How the radar's tracks are made.
+struct RadarCase {
+  map::FilterKind filter = map::FilterKind::kFourState;
+  // Less what the radar is off in each scenario on the whole.
+  bool calibrated = false;
+  // Times the class's process noise.
+  double process_noise = 1;
+};
+
 // The tracks of one scenario by target; `bias` is taken off the detections.
 std::map<int, TargetTrack> FollowScenario(const nlohmann::json& detections,
                                           const nlohmann::json& truths,
-                                          map::FilterKind filter,
+                                          const RadarCase& made,
                                           const Bias& bias) {
   const map::NedFrame plane(
       {.latitude_deg = 63.4389029083, .longitude_deg = 10.39908278});
-  map::ContactMap map(map::ContactMapOptions{.filter = filter});
+  map::ContactMapOptions options{.filter = made.filter};
+  options.classes[static_cast<std::size_t>(map::ContactClass::kSmallCraft)]
+      .process_noise_m2_s3 *= made.process_noise;
+  map::ContactMap map(options);
   std::map<int, TargetTrack> tracks;
   for (std::size_t i = 0; i < detections.size(); ++i) {
     const nlohmann::json& scan = detections[i];
@@ -132,9 +144,7 @@ std::optional<nlohmann::json> ReadJson(const std::string& path) {
   return json;
 }
 
-// `calibrated`: less what the radar is off in each scenario on the whole.
-nlohmann::json RadarRow(const std::string& folder, map::FilterKind filter,
-                        bool calibrated) {
+nlohmann::json RadarRow(const std::string& folder, const RadarCase& made) {
   std::vector<double> rmse_m;
   std::vector<double> measured_m;
   int reports = 0;
@@ -145,8 +155,8 @@ nlohmann::json RadarRow(const std::string& folder, map::FilterKind filter,
     const auto detections = ReadJson(path + "_detections.json");
     const auto truths = ReadJson(path + "_groundTruth.json");
     if (!detections.has_value() || !truths.has_value()) continue;
-    auto tracks = FollowScenario(*detections, *truths, filter, {});
-    if (calibrated) {
+    auto tracks = FollowScenario(*detections, *truths, made, {});
+    if (made.calibrated) {
       Bias bias;
       double count = 0;
       for (const auto& [target, track] : tracks) {
@@ -156,7 +166,7 @@ nlohmann::json RadarRow(const std::string& folder, map::FilterKind filter,
       }
       bias.range_m /= count;
       bias.bearing_deg /= count;
-      tracks = FollowScenario(*detections, *truths, filter, bias);
+      tracks = FollowScenario(*detections, *truths, made, bias);
     }
     for (const auto& [target, track] : tracks) {
       rmse_m.push_back(std::sqrt(track.square_m2 / track.reports));
@@ -173,8 +183,11 @@ nlohmann::json RadarRow(const std::string& folder, map::FilterKind filter,
     return values.size() % 2 == 1 ? values[half]
                                   : 0.5 * (values[half - 1] + values[half]);
   };
-  return {{"scene", "radar_" + std::string(map::FilterName(filter)) +
-                        (calibrated ? "_calibrated" : "")},
+  std::string scene = "radar_" + std::string(map::FilterName(made.filter));
+  if (made.calibrated) scene += "_calibrated";
+  if (made.process_noise < 1) scene += "_calm";
+  if (made.process_noise > 1) scene += "_lively";
+  return {{"scene", scene},
           {"tracks", rmse_m.size()},
           {"reports", reports},
           {"gated", gated},
@@ -295,11 +308,16 @@ nlohmann::json AisRow(const std::string& path) {
 
 nlohmann::json RecordedContactFigures(const std::string& folder) {
   auto rows = nlohmann::json::array();
+  const std::string radar = folder + "/autoferry";
   for (nlohmann::json row :
-       {RadarRow(folder + "/autoferry", map::FilterKind::kFourState, false),
-        RadarRow(folder + "/autoferry", map::FilterKind::kPerAxis, false),
-        RadarRow(folder + "/autoferry", map::FilterKind::kFourState, true),
-        RadarRow(folder + "/autoferry", map::FilterKind::kPerAxis, true),
+       {RadarRow(radar, {}),
+        // What is wrong with the raw tracks is not the process noise.
+        RadarRow(radar, {.process_noise = 0.1}),
+        RadarRow(radar, {.process_noise = 50}),
+        RadarRow(radar, {.filter = map::FilterKind::kPerAxis}),
+        RadarRow(radar, {.calibrated = true}),
+        RadarRow(radar,
+                 {.filter = map::FilterKind::kPerAxis, .calibrated = true}),
         AisRow(folder + "/solent-ais/SolentAIS_20160112_130211.csv")}) {
     if (!row.is_null()) rows.push_back(std::move(row));
   }
