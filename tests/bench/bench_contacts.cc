@@ -4,6 +4,7 @@
 #include <benchmark/benchmark.h>
 
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <memory>
@@ -223,6 +224,29 @@ void BM_AnswerContactsFar(benchmark::State& state) {
   AskPoints(state, *map.View(), 500);
 }
 BENCHMARK(BM_AnswerContactsFar)->Arg(1)->Arg(10'000);
+
+// Both turn by turn: what ten thousand contacts, none near, cost.
+void BM_AnswerTenThousandFar(benchmark::State& state) {
+  using Clock = std::chrono::steady_clock;
+  ObstacleMap none = WarmMission(0);
+  ObstacleMap many = WarmMission(10'000);
+  const std::shared_ptr<const ObstacleMapView> views[] = {none.View(),
+                                                          many.View()};
+  const std::vector<ObstacleQuery> queries = ScatteredQueries(500);
+  Clock::duration spent[2] = {};
+  for (auto _ : state) {
+    for (const int side : {0, 1}) {
+      const auto start = Clock::now();
+      for (const ObstacleQuery& query : queries) {
+        benchmark::DoNotOptimize(views[side]->Answer(query));
+      }
+      spent[side] += Clock::now() - start;
+    }
+  }
+  state.counters["ratio"] = std::chrono::duration<double>(spent[1]).count() /
+                            std::chrono::duration<double>(spent[0]).count();
+}
+BENCHMARK(BM_AnswerTenThousandFar);
 
 // One contact that reaches every point.
 void BM_AnswerContactNear(benchmark::State& state) {

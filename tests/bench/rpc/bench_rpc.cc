@@ -119,6 +119,33 @@ absl::StatusOr<double> IngestPings(const Client& server, int round, int pings) {
   return pings / SecondsSince(start);
 }
 
+// Contact reports per second until all are durable, one stream: ranges and
+// bearings of kContacts vessels, each once a second.
+absl::StatusOr<double> IngestContacts(const Client& server, int round,
+                                      int reports) {
+  constexpr int kContacts = 100;
+  std::mt19937_64 random(static_cast<uint64_t>(round));
+  std::vector<v1::ContactReport> distinct(1000);
+  for (size_t i = 0; i < distinct.size(); ++i) {
+    FillReport(random, static_cast<int>(i) % kContacts, distinct[i]);
+  }
+  FATHOM_ASSIGN_OR_RETURN(
+      const auto stream,
+      server.OpenContactStream({.source_id = "contacts",
+                                .epoch = static_cast<uint64_t>(round) + 1}));
+  const int64_t begin_s =
+      distinct[0].time().seconds() + round * (reports / kContacts + 1);
+  const auto start = SteadyClock::now();
+  for (int i = 0; i < reports; ++i) {
+    v1::ContactReport& report =
+        distinct[static_cast<size_t>(i) % distinct.size()];
+    report.mutable_time()->set_seconds(begin_s + i / kContacts);
+    FATHOM_RETURN_IF_ERROR(stream->Send(report).status());
+  }
+  FATHOM_RETURN_IF_ERROR(stream->Finish());
+  return reports / SecondsSince(start);
+}
+
 // Runs `measure` against both sides in turn and reports medians.
 absl::Status Compare(const Client& fathom, const Client& null, int rounds,
                      const std::string& key, const std::string& unit,
@@ -162,6 +189,10 @@ absl::Status Run(const std::string& server, const std::string& null, int rounds,
                                  [pings](const Client& side, int round) {
                                    return IngestPings(side, round, pings);
                                  }));
+  FATHOM_RETURN_IF_ERROR(compare("ingest_contacts_ratio", "reports/s",
+                                 [pings](const Client& side, int round) {
+                                   return IngestContacts(side, round, pings);
+                                 }));
   std::cout << report.dump(2) << "\n";
   return absl::OkStatus();
 }
@@ -178,7 +209,8 @@ int Main(int argc, char** argv) {
   app.add_option("--rounds", rounds, "Rounds of each measure")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  app.add_option("--pings", pings, "Pings in each round of ingest")
+  app.add_option("--pings", pings,
+                 "Pings, and contact reports, in each round of ingest")
       ->check(CLI::Range(100, 10'000'000))
       ->capture_default_str();
   app.add_option("--only", only, "Measure this key alone");

@@ -1,6 +1,7 @@
 #include "tests/bench/rpc/bench_rpc_scene.h"
 
 #include <cmath>
+#include <string>
 
 #include "base/status_macros.h"
 
@@ -79,6 +80,20 @@ void FillPing(std::mt19937_64& random, v1::Ping& ping) {
     ping.add_depth_m(static_cast<float>(Uniform(random, 18, 22)));
     ping.add_std_m(0.5f);
   }
+}
+
+void FillReport(std::mt19937_64& random, int contact,
+                v1::ContactReport& report) {
+  std::normal_distribution<double> normal;
+  report.set_contact_id("v" + std::to_string(contact));
+  report.set_contact_class(v1::CONTACT_CLASS_VESSEL);
+  report.mutable_time()->set_seconds(kStartSeconds);
+  v1::RangeBearing& heard = *report.mutable_range_bearing();
+  FillPlace(500, 500, *heard.mutable_pose()->mutable_position());
+  heard.set_range_m(2000 + 100 * contact + 20 * normal(random));
+  heard.set_bearing_deg(3.6 * contact - 180 + normal(random));
+  heard.set_range_std_m(20);
+  heard.set_bearing_std_deg(1);
 }
 
 void FillQuery(std::mt19937_64& random, v1::QueryObstacleRequest& query) {

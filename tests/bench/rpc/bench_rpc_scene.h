@@ -22,6 +22,11 @@ absl::Status PrepareScene(const client::Client& server, int pings);
 // The next ping of a vehicle that criss-crosses the area: 101 beams.
 void FillPing(std::mt19937_64& random, v1::Ping& ping);
 
+// A report about vessel `contact`: heard from the area at 2 to 12 km, 20 m and
+// 1 degree.
+void FillReport(std::mt19937_64& random, int contact,
+                v1::ContactReport& report);
+
 // A question at a random place in the area.
 void FillQuery(std::mt19937_64& random, v1::QueryObstacleRequest& query);
 

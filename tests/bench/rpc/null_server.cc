@@ -69,13 +69,28 @@ class NullObstacleService final : public v1::ObstacleService::CallbackService {
   }
 };
 
-// Reads pings and throws them away; acks what has come once every kAckDelay,
-// as a group commit that costs nothing would.
-class NullPingReactor final
-    : public grpc::ServerBidiReactor<v1::StreamPingsRequest,
-                                     v1::StreamPingsResponse> {
+const v1::Ping& Numbered(const v1::StreamPingsRequest& request) {
+  return request.ping();
+}
+const v1::ContactReport& Numbered(const v1::StreamContactsRequest& request) {
+  return request.report();
+}
+
+void Fill(uint64_t count, v1::StreamPingsResponse& ack) {
+  ack.set_pings_applied(count);
+  ack.set_measurements_accepted(count * 101);
+}
+void Fill(uint64_t count, v1::StreamContactsResponse& ack) {
+  ack.set_reports_applied(count);
+}
+
+// Reads pings or reports and throws them away; acks what has come once every
+// kAckDelay, as a group commit that costs nothing would.
+template <typename Request, typename Response>
+class NullStreamReactor final
+    : public grpc::ServerBidiReactor<Request, Response> {
  public:
-  NullPingReactor() { StartRead(&request_); }
+  NullStreamReactor() { this->StartRead(&request_); }
 
   void OnReadDone(bool ok) override {
     const std::lock_guard lock(mutex_);
@@ -84,10 +99,10 @@ class NullPingReactor final
       Advance();
       return;
     }
-    epoch_ = request_.ping().epoch();
-    received_ = request_.ping().sequence();
+    epoch_ = Numbered(request_).epoch();
+    received_ = Numbered(request_).sequence();
     Advance();
-    StartRead(&request_);
+    this->StartRead(&request_);
   }
 
   void OnWriteDone(bool /*ok*/) override {
@@ -107,7 +122,7 @@ class NullPingReactor final
     if (received_ == acked_) {
       if (read_all_) {
         busy_ = true;
-        Finish(grpc::Status::OK);
+        this->Finish(grpc::Status::OK);
       }
       return;
     }
@@ -123,15 +138,14 @@ class NullPingReactor final
     response_.set_applied_sequence(acked_);
     response_.set_durable_sequence(acked_);
     response_.set_map_revision(acked_);
-    response_.set_pings_applied(acked_);
-    response_.set_measurements_accepted(acked_ * 101);
-    StartWrite(&response_);
+    Fill(acked_, response_);
+    this->StartWrite(&response_);
   }
 
   std::mutex mutex_;
   grpc::Alarm alarm_;
-  v1::StreamPingsRequest request_;
-  v1::StreamPingsResponse response_;
+  Request request_;
+  Response response_;
   uint64_t epoch_ = 0;
   uint64_t received_ = 0;
   uint64_t acked_ = 0;
@@ -144,7 +158,16 @@ class NullIngestService final : public v1::IngestService::CallbackService {
  public:
   grpc::ServerBidiReactor<v1::StreamPingsRequest, v1::StreamPingsResponse>*
   StreamPings(grpc::CallbackServerContext*) override {
-    return new NullPingReactor();  // Deletes itself in OnDone.
+    // Deletes itself in OnDone.
+    return new NullStreamReactor<v1::StreamPingsRequest,
+                                 v1::StreamPingsResponse>();
+  }
+
+  grpc::ServerBidiReactor<v1::StreamContactsRequest,
+                          v1::StreamContactsResponse>*
+  StreamContacts(grpc::CallbackServerContext*) override {
+    return new NullStreamReactor<v1::StreamContactsRequest,
+                                 v1::StreamContactsResponse>();
   }
 };
 
