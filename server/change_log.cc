@@ -165,9 +165,9 @@ void ChangeLog::Show(ViewPtr view) {
 ChangeLog::Read ChangeLog::ReadAreas(
     ChangeNumber seen, absl::FunctionRef<void(const GeoBox&)> visit) const {
   MutexLock lock(mutex_);
-  const Read read = {.view = view_,
-                     .lost = areas_.Lost(seen),
-                     .seen = ChangeNumber::After(view_->revision())};
+  Read read = {.view = view_,
+               .lost = areas_.Lost(seen),
+               .seen = ChangeNumber::After(view_->revision())};
   if (read.lost) return read;
   areas_.ForEachAfter(seen,
                       [&](const AreaKey&, const GeoBox& box) { visit(box); });
@@ -177,9 +177,9 @@ ChangeLog::Read ChangeLog::ReadAreas(
 ChangeLog::Read ChangeLog::ReadContacts(
     ChangeNumber seen, absl::FunctionRef<void(uint32_t)> visit) const {
   MutexLock lock(mutex_);
-  const Read read = {.view = view_,
-                     .lost = contacts_.Lost(seen),
-                     .seen = ChangeNumber::After(view_->revision())};
+  Read read = {.view = view_,
+               .lost = contacts_.Lost(seen),
+               .seen = ChangeNumber::After(view_->revision())};
   if (read.lost) return read;
   contacts_.ForEachAfter(seen,
                          [&](uint32_t number, const Empty&) { visit(number); });
