@@ -79,7 +79,7 @@ ChangeLog::ViewPtr TrajectoryWatch::ReadLog() {
   stale_ = stale_ || areas.lost || contacts.lost;
   // Of the two views the older: what came between them is read again.
   const bool older = areas.view->revision() <= contacts.view->revision();
-  const ChangeLog::ViewPtr view = older ? areas.view : contacts.view;
+  ChangeLog::ViewPtr view = older ? areas.view : contacts.view;
   seen_areas_ = ChangeNumber::After(view->revision());
   seen_contacts_ = seen_areas_;
   return view;
