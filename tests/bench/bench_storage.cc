@@ -130,39 +130,60 @@ BENCHMARK(BM_CommitPings)
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
 
-// Durable contact reports a second, history rows included, 1000 a transaction
-// over 100 contacts.
-void BM_CommitContacts(benchmark::State& state) {
-  const TempDir dir;
-  auto file = MissionFile::Create(dir.File("m"), SampleMetadata());
-  std::uint64_t revision = 0;
-  for (auto _ : state) {
-    state.PauseTiming();
-    Batch batch;
-    for (int i = 0; i < 1000; ++i) {
-      ++revision;
-      ContactHistoryRow row{
-          .revision = revision, .estimate = {}, .revises = false};
-      static_cast<map::ContactPoint&>(row.estimate) = SampleContactPoint(1);
-      row.estimate.frame_origin = {.latitude_deg = 41, .longitude_deg = -70};
-      row.estimate.time = TimeFromUnixMicros(static_cast<int>(revision));
-      row.estimate.key = {.source = {"ais"},
-                          .contact = {std::to_string(i % 100)}};
+// `count` reports over 100 contacts behind `revision`, which moves on; with
+// their rows of history, and with the journal or without.
+Batch ContactBatch(std::uint64_t& revision, int count, bool journal) {
+  Batch batch;
+  for (int i = 0; i < count; ++i) {
+    ++revision;
+    ContactHistoryRow row{
+        .revision = revision, .estimate = {}, .revises = false};
+    static_cast<map::ContactPoint&>(row.estimate) = SampleContactPoint(1);
+    row.estimate.frame_origin = {.latitude_deg = 41, .longitude_deg = -70};
+    row.estimate.time = TimeFromUnixMicros(static_cast<int>(revision));
+    row.estimate.key = {.source = {"ais"},
+                        .contact = {std::to_string(i % 100)}};
+    if (journal) {
       batch.journal.push_back(
           {revision,
            ContactRecord{.epoch = 1,
                          .sequence = revision,
                          .report = SampleReport(i, std::to_string(i % 100))}});
-      batch.contact_history.push_back(std::move(row));
     }
+    batch.contact_history.push_back(std::move(row));
+  }
+  return batch;
+}
+
+// Durable contact reports a second, history rows included, 1000 a transaction
+// over 100 contacts, with so many thousand rows of history behind them.
+void BM_CommitContacts(benchmark::State& state) {
+  const TempDir dir;
+  auto file = MissionFile::Create(dir.File("m"), SampleMetadata());
+  std::uint64_t revision = 0;
+  for (std::int64_t i = 0; i < state.range(0); i += 20) {
+    if (!(*file)->Commit(ContactBatch(revision, 20'000, false)).ok()) {
+      std::abort();
+    }
+  }
+  const std::uint64_t before = revision;
+  for (auto _ : state) {
+    state.PauseTiming();
+    const Batch batch = ContactBatch(revision, 1000, true);
     state.ResumeTiming();
     const absl::Status status = (*file)->Commit(batch);
     if (!status.ok()) state.SkipWithError(status.ToString().c_str());
   }
   state.counters["reports_per_s"] = benchmark::Counter(
-      static_cast<double>(revision), benchmark::Counter::kIsRate);
+      static_cast<double>(revision - before), benchmark::Counter::kIsRate);
 }
-BENCHMARK(BM_CommitContacts)->UseRealTime()->Unit(benchmark::kMillisecond);
+// FATHOM_HISTORY_THOUSANDS adds a size: 10 000 take four gigabytes and minutes.
+BENCHMARK(BM_CommitContacts)
+    ->Apply([](auto* benchmark) {
+      benchmark->Arg(0)->Arg(1000);
+      const char* more = std::getenv("FATHOM_HISTORY_THOUSANDS");
+      if (more != nullptr) benchmark->Arg(std::atoll(more));
+    }) -> UseRealTime() -> Unit(benchmark::kMillisecond);
 
 // A block of a local map, all cells measured a few times.
 void BM_EncodeBlock(benchmark::State& state) {
