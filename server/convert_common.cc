@@ -32,6 +32,15 @@ void WriteRejects(const map::RejectCounts& counts,
   }
 }
 
+void WriteNames(const std::vector<map::ContactKey>& names,
+                google::protobuf::RepeatedPtrField<v1::ContactName>* out) {
+  for (const map::ContactKey& name : names) {
+    v1::ContactName* entry = out->Add();
+    entry->set_source_id(name.source.value);
+    entry->set_contact_id(name.contact.value);
+  }
+}
+
 void WriteContact(const map::ContactEstimate& estimate,
                   v1::ContactEstimate* out) {
   out->set_contact_id(estimate.key.contact.value);
@@ -52,6 +61,7 @@ void WriteContact(const map::ContactEstimate& estimate,
   out->set_keel_depth_m(estimate.keel_depth_m);
   out->set_radius_m(estimate.radius_m);
   out->set_report_count(estimate.report_count);
+  WriteNames(estimate.linked, out->mutable_also_known_as());
 }
 
 }  // namespace fathom::server

@@ -23,6 +23,9 @@ void WriteStamp(const map::ObstacleMapView& view, v1::MapStamp* out);
 // One entry for each reason that occurred.
 void WriteRejects(const map::RejectCounts& counts,
                   google::protobuf::RepeatedPtrField<v1::RejectCount>* out);
+// The names of a contact beside the one that is told first.
+void WriteNames(const std::vector<map::ContactKey>& names,
+                google::protobuf::RepeatedPtrField<v1::ContactName>* out);
 // The contact's estimate, its covariance as the upper triangle of
 // [n e vn ve] about its own position.
 void WriteContact(const map::ContactEstimate& estimate,

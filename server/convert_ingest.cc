@@ -1,5 +1,6 @@
 #include "server/convert_ingest.h"
 
+#include <algorithm>
 #include <numbers>
 #include <optional>
 #include <utility>
@@ -147,6 +148,42 @@ absl::StatusOr<map::ContactFix> ConvertFix(const v1::ContactFix& fix,
   return result;
 }
 
+// The other names of the report's contact.
+absl::StatusOr<std::vector<map::ContactKey>> ConvertNames(
+    const v1::ContactReport& report, const FieldPath& path) {
+  if (report.has_range_bearing() || report.inactive()) {
+    return InvalidField(path.ToString(),
+                        "beside a range_bearing or inactive: names are linked "
+                        "by a fix or by a report that observes nothing");
+  }
+  const auto count = static_cast<size_t>(report.same_as().names_size());
+  if (count > map::kMaxLinkedNames) {
+    return LimitExceeded((path.ToString() + ".names").c_str(), count,
+                         map::kMaxLinkedNames);
+  }
+  std::vector<map::ContactKey> names;
+  for (size_t i = 0; i < count; ++i) {
+    const v1::ContactName& name = report.same_as().names(static_cast<int>(i));
+    const FieldPath here(path, "names", i);
+    FATHOM_RETURN_IF_ERROR(
+        CheckId(name.source_id(), FieldPath(here, "source_id")));
+    FATHOM_RETURN_IF_ERROR(CheckId(name.contact_id(),
+                                   FieldPath(here, "contact_id"),
+                                   /*allow_colon=*/true));
+    map::ContactKey key = {.source = {name.source_id()},
+                           .contact = {name.contact_id()}};
+    if (key == map::ContactKey{.source = {report.source_id()},
+                               .contact = {report.contact_id()}} ||
+        std::find(names.begin(), names.end(), key) != names.end()) {
+      return InvalidField(here.ToString(),
+                          "is the report's own name or named twice",
+                          v1::REJECT_REASON_BAD_LINK);
+    }
+    names.push_back(std::move(key));
+  }
+  return names;
+}
+
 // The refusal that a failed conversion means.
 Refusal ToRefusal(const absl::Status& status) {
   const std::optional<FieldViolation> violation = ViolationOf(status);
@@ -267,11 +304,17 @@ absl::StatusOr<map::ContactReport> ConvertReport(
       break;
     }
     case v1::ContactReport::OBSERVATION_NOT_SET:
-      if (!report.inactive()) {
+      if (report.has_same_as()) {
+        result.observation = map::NothingObserved{};
+      } else if (!report.inactive()) {
         return Missing(FieldPath(path, "observation"),
-                       "range_bearing or fix, or set inactive");
+                       "range_bearing, fix or same_as, or set inactive");
       }
       break;
+  }
+  if (report.has_same_as()) {
+    FATHOM_ASSIGN_OR_RETURN(result.same_as,
+                            ConvertNames(report, FieldPath(path, "same_as")));
   }
   if (report.has_depth_m()) {
     FATHOM_RETURN_IF_ERROR(

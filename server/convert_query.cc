@@ -59,6 +59,9 @@ void WriteContactReason(const map::ContactReason& reason,
   out->set_probability(reason.probability);
   out->set_distance_m(reason.distance_m);
   out->set_age_s(reason.age_s);
+  if (reason.links != nullptr) {
+    WriteNames(reason.links->names, out->mutable_also_known_as());
+  }
 }
 
 absl::Status CheckLength(int count, int expected, const FieldPath& path) {

@@ -162,6 +162,9 @@ void WriteVerdict(const map::TrajectoryVerdict& verdict,
     WriteTime(approach.time, entry->mutable_time());
     entry->set_distance_m(approach.distance_m);
     entry->set_probability(approach.probability);
+    if (approach.links != nullptr) {
+      WriteNames(approach.links->names, entry->mutable_also_known_as());
+    }
   }
 }
 

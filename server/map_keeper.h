@@ -205,8 +205,7 @@ class MapKeeper {
   struct StorageItem {
     // What the journal, the history and the ledger keep of it.
     std::optional<storage::JournalRecord> record;
-    std::vector<map::ContactEstimate> contact_estimates;
-    bool contact_revised = false;
+    std::vector<storage::ContactHistoryRow> contact_history;
     std::optional<storage::SourcePosition> position;
     // Set: this view is to be saved whole, and with it how far imports got.
     ViewPtr checkpoint;

@@ -74,13 +74,8 @@ absl::Status MapKeeper::CommitItems(std::vector<StorageItem>& items) {
     size_t end = begin;
     for (; end < items.size() && checkpoint == nullptr; ++end) {
       StorageItem& item = items[end];
-      bool revises = item.contact_revised;
-      for (map::ContactEstimate& estimate : item.contact_estimates) {
-        batch.contact_history.push_back({.revision = item.record->revision,
-                                         .estimate = std::move(estimate),
-                                         .revises = revises});
-        revises = false;  // The first does it for all.
-      }
+      std::move(item.contact_history.begin(), item.contact_history.end(),
+                std::back_inserter(batch.contact_history));
       if (item.record.has_value()) {
         batch.journal.push_back(*std::move(item.record));
         records += 1;

@@ -10,9 +10,13 @@
 namespace fathom::storage {
 namespace {
 
-// 2 added the recent reports; of an older one there are none.
+// 2 added the recent reports; of an older one there are none. 3 is 2 and the
+// contact's other names behind, written where it has any.
 constexpr std::uint8_t kContactVersion = 2;
+constexpr std::uint8_t kLinkedContactVersion = 3;
+// 2 is 1 and the other names behind, written where there are any.
 constexpr std::uint8_t kEstimateVersion = 1;
+constexpr std::uint8_t kLinkedEstimateVersion = 2;
 
 // A recent report was gated, or gave so many points.
 constexpr std::uint8_t kGatedFate = 3;
@@ -22,7 +26,9 @@ enum ReportFlag : std::uint8_t {
   kHasDepth = 2,
   kHasDepthStd = 4,
   kInactive = 8,
-  kAllReportFlags = 15,
+  kHasSameAs = 16,
+  kNothingObserved = 32,
+  kAllReportFlags = 63,
 };
 
 void PutPoint(const map::GeodeticPoint& point, ByteWriter& writer) {
@@ -35,6 +41,23 @@ map::GeodeticPoint GetPoint(ByteReader& reader) {
   point.latitude_deg = reader.GetF64();
   point.longitude_deg = reader.GetF64();
   return point;
+}
+
+void PutNames(const std::vector<map::ContactKey>& names, ByteWriter& writer) {
+  writer.PutVarint(names.size());
+  for (const map::ContactKey& name : names) {
+    writer.PutString(name.source.value);
+    writer.PutString(name.contact.value);
+  }
+}
+
+std::vector<map::ContactKey> GetNames(ByteReader& reader) {
+  std::vector<map::ContactKey> names(reader.GetCount(map::kMaxLinkedNames));
+  for (map::ContactKey& name : names) {
+    name.source.value = reader.GetString();
+    name.contact.value = reader.GetString();
+  }
+  return names;
 }
 
 map::ContactClass GetContactClass(ByteReader& reader) {
@@ -90,6 +113,9 @@ void PutContactReport(const map::ContactReport& report, ByteWriter& writer) {
   if (report.depth_m.has_value()) flags |= kHasDepth;
   if (report.depth_std_m.has_value()) flags |= kHasDepthStd;
   if (report.inactive) flags |= kInactive;
+  if (report.same_as.has_value()) flags |= kHasSameAs;
+  const auto* const polar = std::get_if<map::RangeBearing>(&report.observation);
+  if (fix == nullptr && polar == nullptr) flags |= kNothingObserved;
   writer.PutU8(flags);
   writer.PutU8(static_cast<std::uint8_t>(report.contact_class));
   writer.PutTime(report.time);
@@ -99,19 +125,19 @@ void PutContactReport(const map::ContactReport& report, ByteWriter& writer) {
     writer.PutF64(fix->velocity_east_m_s);
     writer.PutF64(fix->position_std_m);
     writer.PutF64(fix->velocity_std_m_s);
-  } else {
-    const auto& polar = std::get<map::RangeBearing>(report.observation);
-    PutPoint(polar.pose.position, writer);
-    writer.PutF64(polar.pose.depth_m);
-    writer.PutF64(polar.pose.heading_deg);
-    writer.PutF64(polar.pose.position_std_m);
-    writer.PutF64(polar.range_m);
-    writer.PutF64(polar.bearing_deg);
-    writer.PutF64(polar.range_std_m);
-    writer.PutF64(polar.bearing_std_deg);
+  } else if (polar != nullptr) {
+    PutPoint(polar->pose.position, writer);
+    writer.PutF64(polar->pose.depth_m);
+    writer.PutF64(polar->pose.heading_deg);
+    writer.PutF64(polar->pose.position_std_m);
+    writer.PutF64(polar->range_m);
+    writer.PutF64(polar->bearing_deg);
+    writer.PutF64(polar->range_std_m);
+    writer.PutF64(polar->bearing_std_deg);
   }
   if (report.depth_m.has_value()) writer.PutF64(*report.depth_m);
   if (report.depth_std_m.has_value()) writer.PutF64(*report.depth_std_m);
+  if (report.same_as.has_value()) PutNames(*report.same_as, writer);
 }
 
 void GetContactReport(ByteReader& reader, map::ContactReport& report) {
@@ -127,6 +153,8 @@ void GetContactReport(ByteReader& reader, map::ContactReport& report) {
     fix.position_std_m = reader.GetF64();
     fix.velocity_std_m_s = reader.GetF64();
     report.observation = fix;
+  } else if ((flags & kNothingObserved) != 0) {
+    report.observation = map::NothingObserved{};
   } else {
     map::RangeBearing polar;
     polar.pose.position = GetPoint(reader);
@@ -142,25 +170,30 @@ void GetContactReport(ByteReader& reader, map::ContactReport& report) {
   if ((flags & kHasDepth) != 0) report.depth_m = reader.GetF64();
   if ((flags & kHasDepthStd) != 0) report.depth_std_m = reader.GetF64();
   report.inactive = (flags & kInactive) != 0;
+  if ((flags & kHasSameAs) != 0) report.same_as = GetNames(reader);
 }
 
-Bytes EncodeContactPoint(const map::ContactPoint& point) {
+Bytes EncodeContactEstimate(const map::ContactEstimate& estimate) {
   ByteWriter writer = StartBlob();
-  PutContactPoint(point, writer);
-  return SealBlob(BlobKind::kContactEstimate, kEstimateVersion,
-                  std::move(writer));
+  PutContactPoint(estimate, writer);
+  if (!estimate.linked.empty()) PutNames(estimate.linked, writer);
+  return SealBlob(
+      BlobKind::kContactEstimate,
+      estimate.linked.empty() ? kEstimateVersion : kLinkedEstimateVersion,
+      std::move(writer));
 }
 
-absl::StatusOr<map::ContactPoint> DecodeContactPoint(ByteSpan blob,
-                                                     std::string_view what) {
+absl::StatusOr<map::ContactEstimate> DecodeContactEstimate(
+    ByteSpan blob, std::string_view what) {
   FATHOM_ASSIGN_OR_RETURN(
       const ByteSpan payload,
-      OpenBlob(BlobKind::kContactEstimate, kEstimateVersion, blob, what));
+      OpenBlob(BlobKind::kContactEstimate, kLinkedEstimateVersion, blob, what));
   ByteReader reader(payload);
-  map::ContactPoint point;
-  GetContactPoint(reader, point);
+  map::ContactEstimate estimate;
+  GetContactPoint(reader, estimate);
+  if (blob[1] >= kLinkedEstimateVersion) estimate.linked = GetNames(reader);
   FATHOM_RETURN_IF_ERROR(reader.Finish(what));
-  return point;
+  return estimate;
 }
 
 Bytes EncodeContact(const map::StoredContact& contact) {
@@ -178,14 +211,21 @@ Bytes EncodeContact(const map::StoredContact& contact) {
     writer.PutU8(recent.gated ? kGatedFate : recent.points);
     PutContactReport(recent.report, writer);
   }
-  return SealBlob(BlobKind::kContact, kContactVersion, std::move(writer));
+  if (contact.links.has_value()) {
+    writer.PutTime(contact.links->since);
+    PutNames(contact.links->names, writer);
+  }
+  return SealBlob(
+      BlobKind::kContact,
+      contact.links.has_value() ? kLinkedContactVersion : kContactVersion,
+      std::move(writer));
 }
 
 absl::StatusOr<map::StoredContact> DecodeContact(ByteSpan blob,
                                                  std::string_view what) {
   FATHOM_ASSIGN_OR_RETURN(
       const ByteSpan payload,
-      OpenBlob(BlobKind::kContact, kContactVersion, blob, what));
+      OpenBlob(BlobKind::kContact, kLinkedContactVersion, blob, what));
   ByteReader reader(payload);
   map::StoredContact contact;
   contact.key.source.value = reader.GetString();
@@ -201,6 +241,11 @@ absl::StatusOr<map::StoredContact> DecodeContact(ByteSpan blob,
       recent.points = recent.gated ? 0 : fate;
       GetContactReport(reader, recent.report);
     }
+  }
+  if (blob[1] >= kLinkedContactVersion) {
+    contact.links.emplace();
+    contact.links->since = reader.GetTime();
+    contact.links->names = GetNames(reader);
   }
   FATHOM_RETURN_IF_ERROR(reader.Finish(what));
   ByteReader rows(bytes);

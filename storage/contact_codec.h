@@ -22,10 +22,10 @@ void PutContactReport(const map::ContactReport& report, ByteWriter& writer);
 // Leaves `key` as it is; fails the reader on what no encoder wrote.
 void GetContactReport(ByteReader& reader, map::ContactReport& report);
 
-// An estimate without its key.
-Bytes EncodeContactPoint(const map::ContactPoint& point);
-absl::StatusOr<map::ContactPoint> DecodeContactPoint(ByteSpan blob,
-                                                     std::string_view what);
+// An estimate without its key; its other names with it.
+Bytes EncodeContactEstimate(const map::ContactEstimate& estimate);
+absl::StatusOr<map::ContactEstimate> DecodeContactEstimate(
+    ByteSpan blob, std::string_view what);
 
 // A contact with its recent estimates and reports.
 // REQUIRES: 1 to map::kRecentEstimates estimates.

@@ -85,7 +85,7 @@ absl::Status ContactTable::AppendHistory(const ContactHistoryRow& row) {
     FATHOM_RETURN_IF_ERROR(revise_.Run());
   }
   const map::GeodeticPoint position = estimate.Position();
-  const Bytes content = EncodeContactPoint(estimate);
+  const Bytes content = EncodeContactEstimate(estimate);
   append_.BindInt(0, number);
   append_.BindInt(1, ToUnixMicros(estimate.time));
   append_.BindUint(2, row.revision);
@@ -135,11 +135,11 @@ absl::Status ReadHistory(
     FATHOM_ASSIGN_OR_RETURN(const bool more, select.Step());
     if (!more) return absl::OkStatus();
     FATHOM_ASSIGN_OR_RETURN(
-        const map::ContactPoint point,
-        DecodeContactPoint(select.ColumnBlob(1), NameOf(key) + " history"));
+        map::ContactEstimate estimate,
+        DecodeContactEstimate(select.ColumnBlob(1), NameOf(key) + " history"));
     ContactHistoryRow row;
     row.revision = select.ColumnUint(0);
-    static_cast<map::ContactPoint&>(row.estimate) = point;
+    row.estimate = std::move(estimate);
     row.estimate.key = key;
     if (!visit(row)) return absl::OkStatus();
   }

@@ -16,7 +16,9 @@
 namespace fathom::storage {
 namespace {
 
+// 2 is 1 with reports that link names, written where a segment holds any.
 constexpr std::uint8_t kJournalVersion = 1;
+constexpr std::uint8_t kLinkingJournalVersion = 2;
 
 // Stored: never reuse a number. In the order of JournalRecord's variant.
 enum RecordKind : std::uint8_t {
@@ -86,8 +88,9 @@ class SegmentWriter {
     PutColumn(rows_.bytes(), writer);
     writer.PutVarint(beams_.size());
     PutColumnBytes(beams_.data(), beams_.size(), sizeof(map::Beam), writer);
-    segment_.content =
-        SealBlob(BlobKind::kJournalSegment, kJournalVersion, std::move(writer));
+    segment_.content = SealBlob(
+        BlobKind::kJournalSegment,
+        links_ ? kLinkingJournalVersion : kJournalVersion, std::move(writer));
     return std::move(segment_);
   }
 
@@ -108,6 +111,7 @@ class SegmentWriter {
     beams_.insert(beams_.end(), ping.beams.begin(), ping.beams.end());
   }
   void AddEvent(const ContactRecord& record) {
+    links_ = links_ || record.report.same_as.has_value();
     AddKey(record.report.key);
     rows_.PutU64(record.epoch);
     rows_.PutU64(record.sequence);
@@ -126,6 +130,7 @@ class SegmentWriter {
   }
 
   JournalSegment segment_;
+  bool links_ = false;
   IdTable ids_;
   ByteWriter rows_;
   std::vector<map::Beam> beams_;
@@ -263,6 +268,12 @@ absl::Status CheckRecord(const JournalRecord& record) {
   }
   if (const auto* contact = std::get_if<ContactRecord>(&record.event)) {
     FATHOM_RETURN_IF_ERROR(CheckId(contact->report.key.source.value));
+    if (contact->report.same_as.has_value()) {
+      for (const map::ContactKey& name : *contact->report.same_as) {
+        FATHOM_RETURN_IF_ERROR(CheckId(name.source.value));
+        FATHOM_RETURN_IF_ERROR(CheckId(name.contact.value));
+      }
+    }
     return CheckId(contact->report.key.contact.value);
   }
   if (const auto* start = std::get_if<map::StartActivity>(&record.event)) {
@@ -302,7 +313,7 @@ absl::Status DecodeJournal(ByteSpan blob, std::string_view what,
                            std::vector<JournalRecord>& records) {
   FATHOM_ASSIGN_OR_RETURN(
       const ByteSpan payload,
-      OpenBlob(BlobKind::kJournalSegment, kJournalVersion, blob, what));
+      OpenBlob(BlobKind::kJournalSegment, kLinkingJournalVersion, blob, what));
   return SegmentReader(payload).ReadAll(what, records);
 }
 

@@ -78,15 +78,15 @@ absl::Status CopyHistory(Connection& from, MissionFile& to, Repair& repair) {
     if (end) return absl::OkStatus();
     ContactHistoryRow row;
     row.revision = select.ColumnUint(2);
-    const absl::StatusOr<map::ContactPoint> point = DecodeContactPoint(
+    absl::StatusOr<map::ContactEstimate> estimate = DecodeContactEstimate(
         select.ColumnBlob(3),
         absl::StrFormat("history of contact_id=%s", select.ColumnText(1)));
-    if (!point.ok()) {
-      if (!absl::IsDataLoss(point.status())) return point.status();
-      repair.left_out.push_back(std::string(point.status().message()));
+    if (!estimate.ok()) {
+      if (!absl::IsDataLoss(estimate.status())) return estimate.status();
+      repair.left_out.push_back(std::string(estimate.status().message()));
       continue;
     }
-    static_cast<map::ContactPoint&>(row.estimate) = *point;
+    row.estimate = *std::move(estimate);
     row.estimate.key = {.source = {select.ColumnText(0)},
                         .contact = {select.ColumnText(1)}};
     batch.contact_history.push_back(std::move(row));

@@ -87,8 +87,8 @@ class Prover {
       const std::string what =
           absl::StrFormat("contact_history contact_number=%d time_us=%d",
                           select.ColumnInt(0), select.ColumnInt(1));
-      const absl::StatusOr<map::ContactPoint> point =
-          DecodeContactPoint(select.ColumnBlob(2), what);
+      const absl::StatusOr<map::ContactEstimate> point =
+          DecodeContactEstimate(select.ColumnBlob(2), what);
       if (!point.ok()) {
         FATHOM_RETURN_IF_ERROR(Note(point.status()));
       } else if (ToUnixMicros(point->time) != select.ColumnInt(1)) {

@@ -37,13 +37,6 @@ ContactPoint SmoothedBy(const ContactPoint& point, const ContactPoint& next,
   return smoothed;
 }
 
-ContactEstimate WithKey(const ContactPoint& point, const ContactKey& key) {
-  ContactEstimate estimate;
-  static_cast<ContactPoint&>(estimate) = point;
-  estimate.key = key;
-  return estimate;
-}
-
 }  // namespace
 
 GeodeticPoint ContactPoint::Position() const {
@@ -127,18 +120,25 @@ std::optional<ContactEstimate> Contact::EstimateAt(
     Time t, const ContactClassTable& classes) const {
   const std::optional<ContactPoint> point = At(t, classes);
   if (!point.has_value()) return std::nullopt;
-  return WithKey(*point, key_);
+  return Named(*point);
 }
 
-ContactEstimate Contact::NewestEstimate() const {
-  return WithKey(newest(), key_);
+ContactEstimate Contact::Named(const ContactPoint& point) const {
+  ContactEstimate estimate;
+  static_cast<ContactPoint&>(estimate) = point;
+  estimate.key = key_;
+  if (links_ != nullptr) estimate.linked = links_->names;
+  return estimate;
 }
 
 StoredContact Contact::ToStored() const {
-  StoredContact stored{.key = key_, .estimates = {}, .recent = {}};
+  StoredContact stored{.key = key_, .estimates = {}, .recent = {}, .links = {}};
+  if (links_ != nullptr) stored.links = *links_;
   stored.estimates.reserve(history_.size());
   for (std::size_t i = 0; i < history_.size(); ++i) {
-    stored.estimates.push_back(WithKey(history_[i], key_));
+    ContactEstimate& estimate = stored.estimates.emplace_back();
+    static_cast<ContactPoint&>(estimate) = history_[i];
+    estimate.key = key_;
   }
   stored.recent.reserve(recent_.size());
   for (std::size_t i = 0; i < recent_.size(); ++i) {

@@ -25,7 +25,9 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "base/time.h"
@@ -86,6 +88,8 @@ struct ContactPoint {
 // A contact's estimate with its name: what is told, stored and restored.
 struct ContactEstimate : ContactPoint {
   ContactKey key;
+  // Its other names at that time, as C4I linked them; in order.
+  std::vector<ContactKey> linked;
 
   friend bool operator==(const ContactEstimate&,
                          const ContactEstimate&) = default;
@@ -122,14 +126,26 @@ struct RecentReport {
 };
 using RecentReports = SharedLog<RecentReport, kRecentReports>;
 
+// Names that C4I said are one contact with another (ContactReport::same_as).
+struct ContactLinks {
+  // From when on; reports of before are not taken any more.
+  Time since;
+  // In order, 1 to kMaxLinkedNames, without the contact's own.
+  std::vector<ContactKey> names;
+
+  friend bool operator==(const ContactLinks&, const ContactLinks&) = default;
+};
+
 // A contact as stored: its newest estimates, oldest first, 1 to
 // kRecentEstimates of them (of more, the newest are taken), and the reports of
 // late behind them.
 struct StoredContact {
   ContactKey key;
+  // Without `linked`: see links.
   std::vector<ContactEstimate> estimates;
   // In order of time, at most kRecentReports.
   std::vector<RecentReport> recent;
+  std::optional<ContactLinks> links = std::nullopt;
 };
 
 // See file comment.
@@ -149,6 +165,8 @@ class Contact {
   const RecentReports& recent() const { return recent_; }
   // The time of the newest report or drop. REQUIRES: a history.
   Time LastTime() const;
+  // Its other names; nullptr: none. Lives with the contact and its copies.
+  const std::shared_ptr<const ContactLinks>& links() const { return links_; }
 
   // The contact at `t`. After the newest estimate: that one predicted on;
   // kStale if silent too long. Between two of one life: smoothed, that is by
@@ -163,12 +181,17 @@ class Contact {
   std::optional<ContactEstimate> EstimateAt(
       Time t, const ContactClassTable& classes) const;
   // newest() with the name.
-  ContactEstimate NewestEstimate() const;
+  ContactEstimate NewestEstimate() const { return Named(newest()); }
+  // A point of it with its names.
+  ContactEstimate Named(const ContactPoint& point) const;
   StoredContact ToStored() const;
 
   // For the holder (ContactSet).
   TrackHistory& history() { return history_; }
   RecentReports& recent() { return recent_; }
+  void set_links(std::shared_ptr<const ContactLinks> links) {
+    links_ = std::move(links);
+  }
 
  private:
   // What is believed of history_[index] after up to kSmoothedAhead later ones
@@ -179,6 +202,7 @@ class Contact {
   ContactKey key_;
   TrackHistory history_;
   RecentReports recent_;
+  std::shared_ptr<const ContactLinks> links_;
 };
 
 // What lies further ahead than so many estimates does not help the past.

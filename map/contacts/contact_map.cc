@@ -1,6 +1,7 @@
 #include "map/contacts/contact_map.h"
 
 #include <algorithm>
+#include <functional>
 #include <utility>
 
 #include "absl/strings/str_format.h"
@@ -15,14 +16,8 @@ RecentReport Remembered(const ContactReport& report, const TrackStep& step) {
                       .gated = step.refused.has_value(),
                       .points = static_cast<std::uint8_t>(step.count)};
   recent.report.key = {};
+  recent.report.same_as.reset();
   return recent;
-}
-
-ContactEstimate WithKey(const ContactPoint& point, const ContactKey& key) {
-  ContactEstimate estimate;
-  static_cast<ContactPoint&>(estimate) = point;
-  estimate.key = key;
-  return estimate;
 }
 
 // Points of the history that came of these.
@@ -65,13 +60,17 @@ ContactSet& ContactMap::Own() {
 
 void ContactMap::Change(const ContactKey& key, ContactChange kind,
                         absl::FunctionRef<void(Contact&)> change) {
-  const Contact* held = set_->Get(key);
-  if (held->dropped()) gone_.erase({held->newest().time, key});
-  Own().Change(key, kind, change);
-  held = set_->Get(key);
-  if (held->dropped()) {
-    gone_.insert({held->newest().time, key});
+  const ContactSet::Place place = set_->Find(key);
+  const Contact& before =
+      *set_->blocks[place.block]->contacts[place.slot].contact;
+  if (before.dropped()) gone_.erase({before.newest().time, key});
+  const Contact& held = Own().Change(place, kind, change);
+  if (held.dropped()) {
+    gone_.insert({held.newest().time, key});
+    SetLinks(key, {}, {});
     ForgetLongestGone();
+  } else {
+    none_stale_until_ = std::min(none_stale_until_, StaleFrom(held.newest()));
   }
 }
 
@@ -93,43 +92,108 @@ void ContactMap::ForgetLongestGone() {
 }
 
 ContactOutcome ContactMap::Apply(const ContactReport& report) {
-  const Contact* held = set_->Get(report.key);
-  ContactOutcome refused;
-  refused.reason = CheckContactReport(report);
-  if (!refused.reason.has_value()) {
-    if (held == nullptr) return ApplyFirst(report);
-    if (report.time < held->LastTime()) return ApplyLate(*held, report);
-    if (!held->dropped() || report.inactive ||
-        set_->live_count < options_->max_contacts) {
-      return ApplyNext(*held, report);
+  if (const auto reason = CheckContactReport(report)) {
+    ContactOutcome refused;
+    refused.reason = reason;
+    if (const Contact* held = set_->Get(report.key)) {
+      refused.estimate = held->NewestEstimate();
     }
-    refused.reason = RejectReason::kContactsFull;
+    return refused;
   }
-  if (held != nullptr) refused.estimate = held->NewestEstimate();
-  return refused;
+  if (report.same_as.has_value()) return ApplyLinking(report);
+  if (!names_.empty()) {
+    const auto name = names_.find(report.key);
+    if (name != names_.end()) return ApplyLinked(name->second, report);
+  }
+  return ApplyOwn(report, 0);
 }
 
-ContactOutcome ContactMap::ApplyFirst(const ContactReport& report) {
+ContactOutcome ContactMap::ApplyOwn(const ContactReport& report,
+                                    std::size_t room) {
+  const Contact* held = set_->Get(report.key);
+  if (held == nullptr) return ApplyFirst(report, room);
+  ContactOutcome outcome;
+  if (held->links() != nullptr && report.time < held->links()->since) {
+    outcome.reason = RejectReason::kTooLate;
+  } else if (report.time < held->LastTime()) {
+    return ApplyLate(*held, report);
+  } else if (!held->dropped() || report.inactive) {
+    return ApplyNext(*held, report);
+  } else if (MakeRoom(report.time, room, outcome.ended)) {
+    // The contact may have been forgotten for it.
+    held = set_->Get(report.key);
+    ContactOutcome back =
+        held == nullptr ? ApplyFirst(report, room) : ApplyNext(*held, report);
+    back.ended = std::move(outcome.ended);
+    return back;
+  } else {
+    outcome.reason = RejectReason::kContactsFull;
+  }
+  outcome.estimate = held->NewestEstimate();
+  return outcome;
+}
+
+ContactOutcome ContactMap::ApplyFirst(const ContactReport& report,
+                                      std::size_t room) {
   ContactOutcome outcome;
   if (report.inactive) {
     outcome.applied = true;
     return outcome;
   }
-  if (set_->live_count >= options_->max_contacts) {
-    outcome.reason = RejectReason::kContactsFull;
-    return outcome;
-  }
   const TrackStep step = Step({}, report, options_->filter, options_->classes);
   outcome.reason = step.refused;
-  if (step.refused.has_value()) return outcome;
+  if (!step.refused.has_value() &&
+      !MakeRoom(report.time, room, outcome.ended)) {
+    outcome.reason = RejectReason::kContactsFull;
+  }
+  if (outcome.reason.has_value()) return outcome;
   auto contact = std::make_shared<Contact>(report.key);
   contact->history().Append(step.points[0]);
   contact->recent().Append(Remembered(report, step));
   outcome.applied = true;
   outcome.estimate = contact->NewestEstimate();
   outcome.estimates = {*outcome.estimate};
+  none_stale_until_ = std::min(none_stale_until_, StaleFrom(contact->newest()));
   Own().Add(std::move(contact));
   return outcome;
+}
+
+Time ContactMap::StaleFrom(const ContactPoint& newest) const {
+  const double stale_after_s =
+      options_->classes[static_cast<std::size_t>(newest.contact_class)]
+          .stale_after_s;
+  // A century is never; stamps of any size come from a file.
+  const Duration span(
+      static_cast<std::int64_t>(std::min(stale_after_s, 3.2e9) * 1e6));
+  return newest.report_time > Time::max() - span ? Time::max()
+                                                 : newest.report_time + span;
+}
+
+bool ContactMap::MakeRoom(Time time, std::size_t room,
+                          std::vector<ContactEstimate>& ended) {
+  if (set_->live_count < options_->max_contacts + room) return true;
+  if (time <= none_stale_until_) return false;
+  const Contact* longest = nullptr;
+  Time first = Time::max();
+  Time second = Time::max();
+  for (const auto& block : set_->blocks) {
+    for (const HeldContact& held : block->contacts) {
+      if (held.contact->dropped()) continue;
+      const Time until = StaleFrom(held.contact->newest());
+      if (until < first) {
+        second = std::exchange(first, until);
+        longest = held.contact.get();
+      } else {
+        second = std::min(second, until);
+      }
+    }
+  }
+  none_stale_until_ = first;
+  if (longest == nullptr || time <= first) return false;
+  none_stale_until_ = second;
+  const ContactOutcome end = Drop(longest->key(), time);
+  ended.insert(ended.end(), end.estimates.begin(), end.estimates.end());
+  return true;
 }
 
 ContactOutcome ContactMap::ApplyNext(const Contact& held,
@@ -142,6 +206,8 @@ ContactOutcome ContactMap::ApplyNext(const Contact& held,
                          .estimate = {},
                          .estimates = {},
                          .revised = false,
+                         .joint = held.links() != nullptr,
+                         .ended = {},
                          .nis = step.nis};
   if (outcome.applied || *outcome.reason == RejectReason::kGated) {
     const auto kind = step.count == 0   ? ContactChange::kReports
@@ -150,13 +216,13 @@ ContactOutcome ContactMap::ApplyNext(const Contact& held,
     Change(report.key, kind, [&](Contact& contact) {
       for (std::size_t i = 0; i < step.count; ++i) {
         contact.history().Append(step.points[i]);
-        outcome.estimates.push_back(WithKey(step.points[i], report.key));
+        outcome.estimates.push_back(contact.Named(step.points[i]));
       }
       contact.recent().Append(Remembered(report, step));
+      outcome.estimate = contact.NewestEstimate();
     });
-  }
-  if (const Contact* now = set_->Get(report.key)) {
-    outcome.estimate = now->NewestEstimate();
+  } else {
+    outcome.estimate = held.NewestEstimate();
   }
   return outcome;
 }
@@ -207,13 +273,13 @@ ContactOutcome ContactMap::ApplyLate(const Contact& held,
   }
   if (!same) {
     outcome.revised = true;
+    outcome.joint = held.links() != nullptr;
     // From the one before on: no matter what stood at one time with it.
     if (points > 0) {
-      outcome.estimates.push_back(
-          WithKey(held.history()[points - 1], report.key));
+      outcome.estimates.push_back(held.Named(held.history()[points - 1]));
     }
     for (const ContactPoint& point : made) {
-      outcome.estimates.push_back(WithKey(point, report.key));
+      outcome.estimates.push_back(held.Named(point));
     }
   }
   Change(report.key, ContactChange::kRevise, [&](Contact& contact) {
@@ -228,7 +294,9 @@ ContactOutcome ContactMap::ApplyLate(const Contact& held,
   return outcome;
 }
 
-ContactOutcome ContactMap::Drop(const ContactKey& key, Time time) {
+ContactOutcome ContactMap::Drop(const ContactKey& named, Time time) {
+  const auto name = names_.find(named);
+  const ContactKey key = name == names_.end() ? named : name->second;
   const Contact* held = set_->Get(key);
   ContactOutcome outcome;
   if (held == nullptr) return outcome;
@@ -239,8 +307,9 @@ ContactOutcome ContactMap::Drop(const ContactKey& key, Time time) {
   const ContactPoint point = DropPoint(
       held->newest(), std::max(time, held->LastTime()), options_->classes);
   outcome.applied = true;
-  outcome.estimate = WithKey(point, key);
+  outcome.estimate = held->Named(point);
   outcome.estimates = {*outcome.estimate};
+  outcome.joint = held->links() != nullptr;
   Change(key, ContactChange::kAppend, [&point](Contact& contact) {
     contact.history().Append(point);
     contact.recent() = {};
@@ -294,6 +363,21 @@ absl::Status ContactMap::Restore(StoredContact stored) {
   if (!contact->dropped() && set_->live_count >= options_->max_contacts) {
     return absl::ResourceExhaustedError(absl::StrFormat(
         "max_contacts=%u are held; raise it", options_->max_contacts));
+  }
+  if (stored.links.has_value()) {
+    const std::vector<ContactKey>& names = stored.links->names;
+    const auto taken = [&](const ContactKey& name) {
+      return name == stored.key || names_.count(name) != 0;
+    };
+    if (contact->dropped() || names.empty() || names.size() > kMaxLinkedNames ||
+        std::adjacent_find(names.begin(), names.end(), std::greater_equal()) !=
+            names.end() ||
+        std::any_of(names.begin(), names.end(), taken)) {
+      return invalid("its other names are none or another's");
+    }
+    for (const ContactKey& name : names) names_.emplace(name, stored.key);
+    contact->set_links(
+        std::make_shared<const ContactLinks>(*std::move(stored.links)));
   }
   Own();
   if (contact->dropped()) gone_.insert({contact->newest().time, stored.key});

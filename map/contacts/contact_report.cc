@@ -1,5 +1,6 @@
 #include "map/contacts/contact_report.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace fathom::map {
@@ -62,12 +63,39 @@ std::optional<RejectReason> Check(const ContactFix& fix) {
   return std::nullopt;
 }
 
+std::optional<RejectReason> Check(const NothingObserved&) {
+  return std::nullopt;
+}
+
+// What a report says of names, whatever is known of them.
+std::optional<RejectReason> CheckLinks(const ContactReport& report) {
+  const bool nothing =
+      std::holds_alternative<NothingObserved>(report.observation);
+  if (!report.same_as.has_value()) {
+    if (nothing && !report.inactive) return RejectReason::kInvalidMessage;
+    return std::nullopt;
+  }
+  if (report.inactive ||
+      std::holds_alternative<RangeBearing>(report.observation)) {
+    return RejectReason::kInvalidMessage;
+  }
+  const std::vector<ContactKey>& names = *report.same_as;
+  if (names.size() > kMaxLinkedNames) return RejectReason::kBadLink;
+  for (auto name = names.begin(); name != names.end(); ++name) {
+    if (*name == report.key || std::find(names.begin(), name, *name) != name) {
+      return RejectReason::kBadLink;
+    }
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 std::optional<RejectReason> CheckContactReport(const ContactReport& report) {
   if (!IsContactClass(report.contact_class)) {
     return RejectReason::kInvalidMessage;
   }
+  if (const auto reason = CheckLinks(report)) return reason;
   if (report.inactive) return std::nullopt;
   if (report.depth_m.has_value()) {
     if (!std::isfinite(*report.depth_m)) return RejectReason::kNotFinite;

@@ -9,8 +9,10 @@
 #ifndef FATHOM_MAP_CONTACTS_CONTACT_REPORT_H_
 #define FATHOM_MAP_CONTACTS_CONTACT_REPORT_H_
 
+#include <cstddef>
 #include <optional>
 #include <variant>
+#include <vector>
 
 #include "base/time.h"
 #include "map/contacts/contact_class.h"
@@ -29,6 +31,8 @@ inline constexpr double kMaxContactSpeedMPerS = 60;        // kInvalidMessage
 inline constexpr double kMaxContactVelocityStdMPerS = 60;  // kBadStd
 inline constexpr double kMinContactDepthM = -100;          // kBadDepth
 inline constexpr double kMaxContactDepthM = 12'000;        // kBadDepth
+// Other names of one contact at once.
+inline constexpr std::size_t kMaxLinkedNames = 8;  // kBadLink
 // A north is needed: reports nearer to a pole are refused (kOutsideArea).
 inline constexpr double kMaxContactLatitudeDeg = 89.9;
 
@@ -62,13 +66,19 @@ struct ContactFix {
   friend bool operator==(const ContactFix&, const ContactFix&) = default;
 };
 
+// The report only says `same_as`: two names are one contact.
+struct NothingObserved {
+  friend bool operator==(const NothingObserved&,
+                         const NothingObserved&) = default;
+};
+
 // One report about one contact.
 struct ContactReport {
   ContactKey key;
   ContactClass contact_class = ContactClass::kUnknown;
   // When it was observed.
   Time time;
-  std::variant<RangeBearing, ContactFix> observation;
+  std::variant<RangeBearing, ContactFix, NothingObserved> observation;
   // Depth of the middle of a submerged contact. For the other classes it only
   // deepens the keel: a surface contact always reaches the surface.
   std::optional<double> depth_m;
@@ -77,6 +87,11 @@ struct ContactReport {
   // The contact is gone: closes the track at `time`; the observation is not
   // looked at (thesis 5.5).
   bool inactive = false;
+  // C4I knows under what other names sources report this contact: from here
+  // on all of them are one track (ContactMap::Apply). Not in a RangeBearing
+  // nor an inactive report. Empty: none, whatever was said before. nullopt: as
+  // before.
+  std::optional<std::vector<ContactKey>> same_as = std::nullopt;
 
   friend bool operator==(const ContactReport&, const ContactReport&) = default;
 };

@@ -48,13 +48,14 @@ ContactBlock& ContactSet::OwnBlock(std::size_t block) {
   return *held;
 }
 
-void ContactSet::Change(const ContactKey& key, ContactChange kind,
-                        absl::FunctionRef<void(Contact&)> change) {
-  const Place place = Find(key);
+const Contact& ContactSet::Change(const Place& place, ContactChange kind,
+                                  absl::FunctionRef<void(Contact&)> change) {
   HeldContact& held = OwnBlock(place.block).contacts[place.slot];
   const bool was_live = !held.contact->dropped();
-  std::optional<SpatialEntry> entry =
-      index.Remove(held.contact.get(), held.code, epoch);
+  // The copy is found in the index by the one that it is of, which others may
+  // have let go.
+  const std::shared_ptr<Contact> before = held.contact;
+  std::optional<SpatialEntry> entry = index.Find(before.get(), held.code);
   if (held.epoch != epoch) {
     held.contact = std::make_shared<Contact>(*held.contact);
     held.epoch = epoch;
@@ -66,10 +67,11 @@ void ContactSet::Change(const ContactKey& key, ContactChange kind,
     if (kind != ContactChange::kAppend) entry.reset();
     entry = MakeSpatialEntry(*held.contact, *classes, entry);
   }
+  index.Replace(before.get(), held.code, *entry, epoch);
   held.code = entry->code;
-  index.Insert(*entry, epoch);
   if (was_live) --live_count;
   if (!held.contact->dropped()) ++live_count;
+  return *held.contact;
 }
 
 void ContactSet::Add(std::shared_ptr<Contact> contact) {

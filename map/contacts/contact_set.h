@@ -67,10 +67,10 @@ struct ContactSet {
 
   // The rest changes the set. REQUIRES: `epoch` is the current one.
 
-  // Lets `change` do to the contact what `kind` says. REQUIRES: held; a
-  // history after it.
-  void Change(const ContactKey& key, ContactChange kind,
-              absl::FunctionRef<void(Contact&)> change);
+  // Lets `change` do to the contact there what `kind` says; returns it.
+  // REQUIRES: place.found; a history after it.
+  const Contact& Change(const Place& place, ContactChange kind,
+                        absl::FunctionRef<void(Contact&)> change);
   // Adds a contact. REQUIRES: its key is not held; a history.
   void Add(std::shared_ptr<Contact> contact);
   // Forgets the contact. REQUIRES: held.

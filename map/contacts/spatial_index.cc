@@ -284,10 +284,32 @@ void SpatialIndex::Insert(const SpatialEntry& entry, std::uint64_t epoch) {
   }
 }
 
-std::optional<SpatialEntry> SpatialIndex::Remove(const Contact* contact,
-                                                 std::uint64_t code,
-                                                 std::uint64_t epoch) {
-  std::optional<SpatialEntry> removed;
+std::optional<SpatialEntry> SpatialIndex::Find(const Contact* contact,
+                                               std::uint64_t code) const {
+  const Node* node = root_.get();
+  for (int level = 0; node != nullptr && !node->leaf; ++level) {
+    node = node->children[ChildAt(code, level)].get();
+  }
+  if (node == nullptr) return std::nullopt;
+  for (const SpatialEntry& entry : node->entries) {
+    if (entry.contact == contact) return entry;
+  }
+  return std::nullopt;
+}
+
+void SpatialIndex::Remove(const Contact* contact, std::uint64_t code,
+                          std::uint64_t epoch) {
+  Change(contact, code, nullptr, epoch);
+}
+
+void SpatialIndex::Replace(const Contact* contact, std::uint64_t code,
+                           const SpatialEntry& entry, std::uint64_t epoch) {
+  if (!Change(contact, code, &entry, epoch)) Insert(entry, epoch);
+}
+
+bool SpatialIndex::Change(const Contact* contact, std::uint64_t code,
+                          const SpatialEntry* entry, std::uint64_t epoch) {
+  bool replaced = false;
   std::array<std::shared_ptr<Node>*, kLevels + 1> path;
   std::size_t depth = 0;
   std::shared_ptr<Node>* slot = &root_;
@@ -298,8 +320,14 @@ std::optional<SpatialEntry> SpatialIndex::Remove(const Contact* contact,
       const auto found = std::find_if(
           node.entries.begin(), node.entries.end(),
           [contact](const SpatialEntry& e) { return e.contact == contact; });
-      if (found != node.entries.end()) {
-        removed = *found;
+      if (found == node.entries.end()) break;
+      // What the leaf holds begins alike in so many bits.
+      const int differs = 2 * (kLevels + 1 - static_cast<int>(depth));
+      replaced =
+          entry != nullptr && (entry->code >> differs) == (code >> differs);
+      if (replaced) {
+        *found = *entry;
+      } else {
         node.entries.erase(found);
       }
       break;
@@ -314,7 +342,7 @@ std::optional<SpatialEntry> SpatialIndex::Remove(const Contact* contact,
       node->Bound();
     }
   }
-  return removed;
+  return replaced;
 }
 
 void SpatialIndex::ForEachCandidate(

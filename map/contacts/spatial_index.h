@@ -84,12 +84,20 @@ SpatialEntry MakeSpatialEntry(const Contact& contact,
 
 class SpatialIndex {
  public:
-  // Adds an entry, or takes out and returns the entry of `contact` (which was
-  // added with `code`; nullopt if it is not there). `epoch`: nodes of another
-  // epoch are shared with a snapshot and are copied. O(depth).
+  // Adds an entry, or takes out the entry of `contact` (which was added with
+  // `code`), if it is there. `epoch`: nodes of another epoch are shared with a
+  // snapshot and are copied. O(depth).
   void Insert(const SpatialEntry& entry, std::uint64_t epoch);
-  std::optional<SpatialEntry> Remove(const Contact* contact, std::uint64_t code,
-                                     std::uint64_t epoch);
+  void Remove(const Contact* contact, std::uint64_t code, std::uint64_t epoch);
+
+  // The entry of `contact`; nullopt if it is not there.
+  std::optional<SpatialEntry> Find(const Contact* contact,
+                                   std::uint64_t code) const;
+
+  // `entry` takes the place of the entry of `contact`: Remove and Insert, on
+  // one way where both are in one leaf.
+  void Replace(const Contact* contact, std::uint64_t code,
+               const SpatialEntry& entry, std::uint64_t epoch);
 
   // Every contact that may at `t` be within reach_m of `point`, and some that
   // may not; in no particular order.
@@ -98,6 +106,10 @@ class SpatialIndex {
 
  private:
   struct Node;
+  // Takes the entry of `contact` out or, if it belongs into the same leaf, puts
+  // `entry` in its place; whether it did that.
+  bool Change(const Contact* contact, std::uint64_t code,
+              const SpatialEntry* entry, std::uint64_t epoch);
   // The node, or a copy of it that this epoch may change.
   static Node& Own(std::shared_ptr<Node>& node, std::uint64_t epoch);
 

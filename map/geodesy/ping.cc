@@ -26,6 +26,8 @@ std::string_view RejectReasonName(RejectReason reason) {
       return "TOO_LATE";
     case RejectReason::kContactsFull:
       return "CONTACTS_FULL";
+    case RejectReason::kBadLink:
+      return "BAD_LINK";
   }
   return "?";
 }

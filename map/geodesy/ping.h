@@ -59,10 +59,11 @@ enum class RejectReason : std::uint8_t {
                        // report, the gross shoal of a sounding.
   kTooLate = 10,       // Older than late reports are accepted (contacts).
   kContactsFull = 11,  // The contact list is full.
+  kBadLink = 12,       // Contacts cannot be linked as the report says.
 };
 
 // One past the greatest RejectReason.
-inline constexpr std::size_t kRejectReasonEnd = 12;
+inline constexpr std::size_t kRejectReasonEnd = 13;
 
 // The name of the reason as in the protocol, e.g. "BELOW_MIN_RANGE"; "?" for
 // a number that is none.

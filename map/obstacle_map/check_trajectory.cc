@@ -107,7 +107,8 @@ class Checker {
       verdict_.approaches.push_back({.key = contact->key(),
                                      .time = approach->time,
                                      .distance_m = approach->distance_m,
-                                     .probability = approach->probability});
+                                     .probability = approach->probability,
+                                     .links = contact->links()});
     }
     std::sort(verdict_.approaches.begin(), verdict_.approaches.end(),
               [](const ContactApproach& a, const ContactApproach& b) {

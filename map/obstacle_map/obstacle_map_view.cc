@@ -93,6 +93,13 @@ void AddContact(const Contact& contact, Digest64& digest) {
         static_cast<uint64_t>(recent.report.time.time_since_epoch().count()));
     digest.Add(uint64_t{recent.points} << 1 | (recent.gated ? 1u : 0u));
   }
+  if (contact.links() == nullptr) return;
+  digest.Add(
+      static_cast<uint64_t>(contact.links()->since.time_since_epoch().count()));
+  for (const ContactKey& name : contact.links()->names) {
+    digest.Add(std::string_view(name.source.value));
+    digest.Add(std::string_view(name.contact.value));
+  }
 }
 
 }  // namespace

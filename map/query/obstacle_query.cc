@@ -134,7 +134,8 @@ void AddContact(const ObstacleQuery& query, const Contact& contact,
   Tell({.key = contact.key(),
         .probability = probability,
         .distance_m = offset_m.norm(),
-        .age_s = std::max(0.0, ToSeconds(query.time - predicted.report_time))},
+        .age_s = std::max(0.0, ToSeconds(query.time - predicted.report_time)),
+        .links = contact.links()},
        answer.contacts);
 }
 

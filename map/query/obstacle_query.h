@@ -29,6 +29,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -98,6 +99,8 @@ struct ContactReason {
   double distance_m = 0;
   // Since its last report before the time asked, seconds, >= 0.
   double age_s = 0;
+  // Its other names; nullptr: none.
+  std::shared_ptr<const ContactLinks> links = nullptr;
 };
 
 // Contacts below this add to P but are not told.

@@ -97,6 +97,8 @@ struct ContactApproach {
   // Of passing within r_contact + r of it, at whatever depth
   // (map/query/closest_approach.h).
   double probability = 0;
+  // Its other names; nullptr: none.
+  std::shared_ptr<const ContactLinks> links = nullptr;
 };
 
 struct TrajectoryVerdict {

@@ -15,14 +15,15 @@ namespace {
 using storage::Bytes;
 using storage::ByteSpan;
 
-void FuzzPoint(ByteSpan payload) {
-  const auto point = storage::DecodeContactPoint(
-      Sealed(storage::BlobKind::kContactEstimate, 1, payload), "point");
-  if (!point.ok()) return;
-  const Bytes stored = storage::EncodeContactPoint(*point);
-  const auto again = storage::DecodeContactPoint(stored, "again");
+void FuzzEstimate(ByteSpan payload, std::uint8_t version) {
+  const auto estimate = storage::DecodeContactEstimate(
+      Sealed(storage::BlobKind::kContactEstimate, version, payload),
+      "estimate");
+  if (!estimate.ok()) return;
+  const Bytes stored = storage::EncodeContactEstimate(*estimate);
+  const auto again = storage::DecodeContactEstimate(stored, "again");
   FATHOM_FUZZ_CHECK(again.ok());
-  FATHOM_FUZZ_CHECK(storage::EncodeContactPoint(*again) == stored);
+  FATHOM_FUZZ_CHECK(storage::EncodeContactEstimate(*again) == stored);
 }
 
 void FuzzContact(ByteSpan payload, std::uint8_t version) {
@@ -55,9 +56,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes,
                                       std::size_t size) {
   if (size == 0) return 0;
   const fathom::storage::ByteSpan payload(bytes + 1, size - 1);
-  switch (bytes[0] % 4) {
+  switch (bytes[0] % 6) {
     case 0:
-      fathom::fuzz::FuzzPoint(payload);
+      fathom::fuzz::FuzzEstimate(payload, 1);
       break;
     case 1:
       fathom::fuzz::FuzzContact(payload, 1);
@@ -65,8 +66,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes,
     case 2:
       fathom::fuzz::FuzzContact(payload, 2);
       break;
-    default:
+    case 3:
       fathom::fuzz::FuzzActivity(payload);
+      break;
+    case 4:
+      fathom::fuzz::FuzzEstimate(payload, 2);
+      break;
+    default:
+      fathom::fuzz::FuzzContact(payload, 3);
   }
   return 0;
 }

@@ -83,8 +83,13 @@ void WriteStorageSeeds(Seeds& seeds) {
         seeds.WriteBlob("tiles", "block-" + std::to_string(blocks++), 1,
                         storage::EncodeBlock(key, block));
       });
+  map::ContactEstimate estimate;
+  static_cast<map::ContactPoint&>(estimate) = storage::SampleContactPoint(1);
   seeds.WriteBlob("contacts", "point", 0,
-                  storage::EncodeContactPoint(storage::SampleContactPoint(1)));
+                  storage::EncodeContactEstimate(estimate));
+  estimate.linked = {{.source = {"ais"}, .contact = {"235000001"}}};
+  seeds.WriteBlob("contacts", "linked-point", 4,
+                  storage::EncodeContactEstimate(estimate));
   map::DiffContacts(
       map::ContactsView(), view->contacts(),
       [&](const map::Contact& contact) {
@@ -92,6 +97,10 @@ void WriteStorageSeeds(Seeds& seeds) {
         // Version 1 is read too.
         seeds.WriteBlob("contacts", "contact", 2, blob);
         seeds.WriteBlob("contacts", "contact-v1", 1, blob);
+        map::StoredContact linked = contact.ToStored();
+        linked.links = map::ContactLinks{.since = {}, .names = estimate.linked};
+        seeds.WriteBlob("contacts", "linked-contact", 5,
+                        storage::EncodeContact(linked));
       },
       [](const map::ContactKey&) {});
   map::StoredActivity activity;

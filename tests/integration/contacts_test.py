@@ -12,8 +12,10 @@ import random
 import statistics
 import unittest
 
-from live_server import (DEADLINE_S, START_S, LiveTest, fix_report,
-                         ingest, obstacle, report_contacts, types)
+import grpc
+
+from live_server import (DEADLINE_S, START_S, LiveTest, ask, at, fix_report,
+                         ingest, obstacle, point, report_contacts, types)
 
 # The radar's frame (contacts/autoferry/README.md).
 PIREN = (63.4389029083, 10.39908278)
@@ -200,6 +202,99 @@ class Outliers(LiveTest):
             gated = {r.reason: r.count for r in
                      server.status().contacts.rejects}
             self.assertEqual(gated[types.REJECT_REASON_GATED], 2)
+
+
+class LinkedNames(LiveTest):
+    """One ship under two sources' names, linked by C4I."""
+
+    def heard(self, sequence, second):
+        report = fix_report(sequence, second=second, contact="S1",
+                            source="sonar")
+        report.range_bearing.pose.position.CopyFrom(point(0, 0))
+        report.range_bearing.range_m = 1000
+        report.range_bearing.bearing_deg = 0
+        report.range_bearing.range_std_m = 5
+        report.range_bearing.bearing_std_deg = 1
+        return report
+
+    def told(self, sequence, second, *names):
+        report = fix_report(sequence, 1000, second=second, contact="T9",
+                            vn=0.0, ve=0.0)
+        report.same_as.SetInParent()
+        for source, contact in names:
+            report.same_as.names.add(source_id=source, contact_id=contact)
+        return report
+
+    def test_are_one_track_through_a_kill_until_it_is_undone(self):
+        names = [("sonar", "S1")]
+        with self.new_mission() as server:
+            for report in (self.heard(1, 0), self.told(1, 10, *names),
+                           self.heard(2, 20)):
+                answer = report_contacts(server, [report])
+                self.assertEqual(answer.reports_applied, 1)
+            digest = server.status(digest=True).map_digest
+            server.kill()
+        with self.reopen() as server:
+            status = server.status(digest=True)
+            self.assertEqual(status.map_digest, digest)
+            self.assertEqual(status.contacts.live, 1)
+            [only] = server.obstacle.ListContacts(
+                obstacle.ListContactsRequest(time=at(20)),
+                timeout=DEADLINE_S).contacts
+            self.assertEqual(only.contact_id, "T9")
+            self.assertEqual(only.report_count, 2)
+            [other] = only.also_known_as
+            self.assertEqual((other.source_id, other.contact_id), names[0])
+            [evidence] = ask(server, 1000, 0, depth_m=1.0,
+                             second=20).answer.contacts
+            self.assertEqual(evidence.contact_id, "T9")
+            self.assertEqual(evidence.also_known_as[0].contact_id, "S1")
+            # The history of both has what both told; the sonar's says where
+            # its own track went on.
+            self.assertEqual(
+                [(e.time.seconds - START_S, e.report_count)
+                 for e in history(server, "c4i", "T9")], [(10, 1), (20, 2)])
+            track = history(server, "sonar", "S1")
+            self.assertEqual([(e.time.seconds - START_S, e.status,
+                               [n.contact_id for n in e.also_known_as])
+                              for e in track],
+                             [(0, types.CONTACT_STATUS_NEW, []),
+                              (10, types.CONTACT_STATUS_DROPPED, ["T9"]),
+                              (20, types.CONTACT_STATUS_ACTIVE, ["T9"])])
+            report_contacts(server, [self.told(2, 30)])
+            report_contacts(server, [self.heard(3, 40)])
+            self.assertEqual(server.status().contacts.live, 2)
+
+    def test_what_cannot_be_linked_says_so(self):
+        with self.new_mission() as server:
+            report = self.told(1, 0, ("sonar", "S1"))
+            report.ClearField("fix")
+            [rejection] = report_contacts(server, [report]).rejections
+            self.assertEqual(rejection.reason, types.REJECT_REASON_BAD_LINK)
+            self.assertIn("none of those named is live",
+                          rejection.description)
+
+
+class TooManyIds(LiveTest):
+    def test_ten_thousand_at_once(self):
+        reports = [fix_report(i, 0, i % 5000, contact=f"c{i}")
+                   for i in range(1, 10_001)]
+        with self.new_mission() as server:
+            error = self.assert_status(
+                grpc.StatusCode.RESOURCE_EXHAUSTED,
+                server.ingest.ReportContacts,
+                ingest.ReportContactsRequest(reports=reports))
+            self.assertIn("1000", error.details())
+            self.assertEqual(server.status().contacts.live, 0)
+            # On a stream: as many as there is room for, the rest by reason.
+            rejections = stream(server, reports)
+            self.assertEqual({r.reason for r in rejections},
+                             {types.REJECT_REASON_CONTACTS_FULL})
+            status = server.status().contacts
+            self.assertEqual(status.live, status.max_contacts)
+            self.assertEqual({r.reason: r.count for r in status.rejects},
+                             {types.REJECT_REASON_CONTACTS_FULL:
+                              10_000 - status.max_contacts})
 
 
 if __name__ == "__main__":

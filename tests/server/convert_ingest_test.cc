@@ -237,6 +237,53 @@ TEST(ConvertReport, AnInactiveReportNeedsNoObservation) {
   EXPECT_THAT(Convert(report), IsOk());
 }
 
+TEST(ConvertReport, LinksNamesBesideAFixOrAlone) {
+  v1::ContactReport report = SampleFix();
+  EXPECT_EQ(Convert(report)->same_as, std::nullopt);
+  report.mutable_same_as();
+  EXPECT_EQ(Convert(report)->same_as, std::vector<map::ContactKey>{});
+  v1::ContactName* name = report.mutable_same_as()->add_names();
+  name->set_source_id("sonar");
+  name->set_contact_id("S:1");
+  const std::vector<map::ContactKey> names = {{{"sonar"}, {"S:1"}}};
+  EXPECT_EQ(Convert(report)->same_as, names);
+  // Nothing is observed.
+  report.clear_observation();
+  const auto alone = Convert(report);
+  EXPECT_EQ(alone->same_as, names);
+  EXPECT_TRUE(std::holds_alternative<map::NothingObserved>(alone->observation));
+
+  const auto refused = [&report](auto spoil) {
+    v1::ContactReport bad = report;
+    spoil(bad);
+    return Convert(bad);
+  };
+  EXPECT_THAT(refused([](auto& r) { r.set_inactive(true); }),
+              Violates("report.same_as"));
+  EXPECT_THAT(refused([](auto& r) {
+                *r.mutable_range_bearing() =
+                    SampleRangeBearing().range_bearing();
+              }),
+              Violates("report.same_as"));
+  EXPECT_THAT(refused([](auto& r) {
+                r.mutable_same_as()->mutable_names(0)->clear_source_id();
+              }),
+              Violates("report.same_as.names[0].source_id"));
+  EXPECT_THAT(refused([](auto& r) {
+                *r.mutable_same_as()->add_names() = r.same_as().names(0);
+              }),
+              Violates("report.same_as.names[1]", v1::REJECT_REASON_BAD_LINK));
+  EXPECT_THAT(refused([](auto& r) {
+                auto* own = r.mutable_same_as()->mutable_names(0);
+                own->set_source_id(r.source_id());
+                own->set_contact_id(r.contact_id());
+              }),
+              Violates("report.same_as.names[0]", v1::REJECT_REASON_BAD_LINK));
+  EXPECT_FALSE(refused([](auto& r) {
+                 for (int i = 0; i < 8; ++i) r.mutable_same_as()->add_names();
+               }).ok());
+}
+
 TEST(ConvertReport, NamesEveryBadField) {
   const std::vector<Spoiled<v1::ContactReport>> fixes = {
       {"report.contact_id", kInvalid, [](auto& r) { r.clear_contact_id(); }},

@@ -102,6 +102,81 @@ TEST_F(KeeperFileTest, ReopenedMapsAreEqualWithAndWithoutACleanStop) {
   }
 }
 
+TEST_F(KeeperFileTest, LinkedNamesSurviveARestartAndHaveOneHistory) {
+  const std::string path = dir_.File("m.fathom");
+  const std::string copy = dir_.File("copy.fathom");
+  NewMission mission;
+  mission.center = map::GeodeticPoint{41.5, -71.4};
+  mission.side_m = 20 * 1852.0;
+  const map::ContactKey track = {{"c4i"}, {"T9"}};
+  const map::ContactKey ais = {{"ais"}, {"m0"}};
+  // As ais/m0 twice; linked; once more; once as c4i/T9.
+  const auto message = [](uint64_t sequence, const map::ContactKey& key) {
+    IngestMessage report = FixMessage(sequence, key.contact.value);
+    report.source = key.source;
+    std::get<map::ContactReport>(report.content).key = key;
+    return report;
+  };
+  std::string digest;
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(auto file,
+                                CreateMission(path, mission, kStart));
+    Open open = OpenKeeper(std::move(file));
+    auto listener = std::make_shared<FakeListener>();
+    for (const uint64_t i : {1, 2}) {
+      ASSERT_THAT(open.keeper->Submit(message(i, ais), listener), IsOk());
+    }
+    IngestMessage link = message(3, track);
+    link.number.sequence = 1;
+    std::get<map::ContactReport>(link.content).same_as = {ais};
+    ASSERT_THAT(open.keeper->Submit(std::move(link), listener), IsOk());
+    IngestMessage next = message(4, ais);
+    next.number.sequence = 3;
+    ASSERT_THAT(open.keeper->Submit(std::move(next), listener), IsOk());
+    IngestMessage own = message(5, track);
+    own.number.sequence = 2;
+    ASSERT_THAT(open.keeper->Submit(std::move(own), listener), IsOk());
+    listener->AwaitDurable(5);
+    digest = open.keeper->View()->Digest();
+    FATHOM_ASSERT_OK(open.file->SaveCopy(copy));
+    FATHOM_ASSERT_OK(open.keeper->Stop());
+    FATHOM_ASSERT_OK(open.file->Close());
+  }
+  for (const std::string& reopened : {path, copy}) {
+    FATHOM_ASSERT_OK_AND_ASSIGN(auto again,
+                                storage::MissionFile::Open(reopened));
+    Open open = OpenKeeper(std::move(again));
+    EXPECT_EQ(open.keeper->View()->Digest(), digest) << reopened;
+    const auto answer = open.keeper->View()->Answer(
+        {.position = {41.5, -71.4}, .time = kStart + Duration(5'000'000)});
+    ASSERT_EQ(answer.contacts.size(), 1u);
+    EXPECT_EQ(answer.contacts[0].key, track);
+    ASSERT_NE(answer.contacts[0].links, nullptr);
+    EXPECT_EQ(answer.contacts[0].links->names,
+              std::vector<map::ContactKey>{ais});
+    const auto seconds = [&](const map::ContactKey& key) {
+      std::vector<std::pair<int64_t, std::string>> rows;
+      FATHOM_EXPECT_OK(open.file->ReadContactHistory(
+          key, Time::min(), Time::max(), [&](const auto& row) {
+            EXPECT_EQ(row.estimate.key, key);
+            rows.emplace_back((row.estimate.time - kStart).count() / 1'000'000,
+                              row.estimate.linked.empty()
+                                  ? ""
+                                  : row.estimate.linked[0].contact.value);
+            return true;
+          }));
+      return rows;
+    };
+    using Rows = std::vector<std::pair<int64_t, std::string>>;
+    EXPECT_EQ(seconds(track), (Rows{{3, "m0"}, {4, "m0"}, {5, "m0"}}));
+    // At 3 s its own track ended and went on as T9.
+    EXPECT_EQ(seconds(ais),
+              (Rows{{1, ""}, {2, ""}, {3, "T9"}, {4, "T9"}, {5, "T9"}}));
+    FATHOM_ASSERT_OK(open.keeper->Stop());
+    FATHOM_ASSERT_OK(open.file->Close());
+  }
+}
+
 // ---- Many threads (what ThreadSanitizer looks at) ----
 
 TEST_F(KeeperFileTest, ManySourcesAndReadersAtOnce) {

@@ -192,7 +192,9 @@ TEST(BlockKey, PacksAndUnpacks) {
 }
 
 TEST(ContactCodec, PointHasTheStatedSize) {
-  EXPECT_EQ(EncodeContactPoint(SampleContactPoint(1)).size(),
+  map::ContactEstimate estimate;
+  static_cast<map::ContactPoint&>(estimate) = SampleContactPoint(1);
+  EXPECT_EQ(EncodeContactEstimate(estimate).size(),
             kBlobHeaderBytes + kContactPointBytes);
 }
 
@@ -221,6 +223,40 @@ TEST(ContactCodec, ContactComesBackBitForBit) {
     EXPECT_EQ(back.recent, contact.recent);
     EXPECT_TRUE(std::signbit(back.estimates[0].frame_origin.longitude_deg));
   }
+}
+
+TEST(ContactCodec, LinkedNamesComeBackAndTakeAVersionOfTheirOwn) {
+  const std::vector<map::ContactKey> names = {
+      {.source = {"ais"}, .contact = {"235000001"}},
+      {.source = {"sonar"}, .contact = {"S:1"}}};
+  map::ContactEstimate estimate;
+  static_cast<map::ContactPoint&>(estimate) = SampleContactPoint(1);
+  EXPECT_EQ(EncodeContactEstimate(estimate)[1], 1);
+  estimate.linked = names;
+  const Bytes blob = EncodeContactEstimate(estimate);
+  EXPECT_EQ(blob[1], 2);
+  FATHOM_ASSERT_OK_AND_ASSIGN(const map::ContactEstimate told,
+                              DecodeContactEstimate(blob, "e"));
+  EXPECT_EQ(told, estimate);
+  ExpectNoCrash(blob, BlobKind::kContactEstimate, [](ByteSpan bytes) {
+    DecodeContactEstimate(bytes, "e").IgnoreError();
+  });
+
+  map::StoredContact contact;
+  contact.key = {.source = {"c4i"}, .contact = {"T9"}};
+  contact.estimates.resize(1);
+  static_cast<map::ContactPoint&>(contact.estimates[0]) = SampleContactPoint(3);
+  contact.estimates[0].key = contact.key;
+  contact.links =
+      map::ContactLinks{.since = TimeFromUnixMicros(7), .names = names};
+  const Bytes stored = EncodeContact(contact);
+  EXPECT_EQ(stored[1], 3);
+  FATHOM_ASSERT_OK_AND_ASSIGN(const map::StoredContact back,
+                              DecodeContact(stored, "c"));
+  EXPECT_EQ(back.links, contact.links);
+  ExpectNoCrash(stored, BlobKind::kContact, [](ByteSpan bytes) {
+    DecodeContact(bytes, "c").IgnoreError();
+  });
 }
 
 TEST(ContactCodec, VersionOneHasNoRecentReports) {
@@ -299,6 +335,14 @@ std::vector<JournalRecord> SampleJournal(int pings) {
       ContactRecord contact{.epoch = 2,
                             .sequence = static_cast<std::uint64_t>(i),
                             .report = SampleReport(i, "ship")};
+      if (i % 12 == 3) {
+        contact.report.same_as.emplace().push_back(
+            {.source = {"ais"}, .contact = {"235000001"}});
+      }
+      if (i % 12 == 9) {
+        contact.report.observation = map::NothingObserved{};
+        contact.report.same_as.emplace();
+      }
       if (i % 2 == 0) {
         contact.report.observation = map::RangeBearing{
             .pose = {.position = {.latitude_deg = 41, .longitude_deg = -70},

@@ -189,6 +189,37 @@ TEST(ContactMap, OneContactTooManyIsRefusedAndTheOthersGoOn) {
   EXPECT_EQ(map.Apply(Fix("a", 4, kBay)).reason, RejectReason::kContactsFull);
 }
 
+TEST(ContactMap, TheOneThatIsStaleLongestMakesRoom) {
+  // Vessels are stale after 600 s.
+  ContactMap map(ContactMapOptions{.max_contacts = 2});
+  ASSERT_TRUE(map.Apply(Fix("a", 0, kBay)).applied);
+  ASSERT_TRUE(map.Apply(Fix("b", 100, kBay)).applied);
+  EXPECT_EQ(map.Apply(Fix("c", 600, kBay)).reason, RejectReason::kContactsFull);
+  const ContactOutcome outcome = map.Apply(Fix("c", 601, kBay));
+  EXPECT_TRUE(outcome.applied);
+  ASSERT_EQ(outcome.ended.size(), 1u);
+  EXPECT_EQ(outcome.ended[0].key, Key("a"));
+  EXPECT_EQ(outcome.ended[0].status, ContactStatus::kDropped);
+  EXPECT_EQ(outcome.ended[0].time, AtS(601));
+  EXPECT_EQ(map.live_count(), 2u);
+  // Its past answers on, and the other is tracked on.
+  EXPECT_TRUE(map.View().At(Key("a"), AtS(300)).has_value());
+  EXPECT_TRUE(map.View().At(Key("b"), AtS(650)).has_value());
+  // It returns when another is stale, and starts anew.
+  EXPECT_EQ(map.Apply(Fix("a", 650, kBay)).reason, RejectReason::kContactsFull);
+  const ContactOutcome back = map.Apply(Fix("a", 701, kBay));
+  EXPECT_TRUE(back.applied);
+  EXPECT_EQ(back.estimate->report_count, 1u);
+  ASSERT_EQ(back.ended.size(), 1u);
+  EXPECT_EQ(back.ended[0].key, Key("b"));
+  // Nothing is stale before 1201 s; but an old report makes room that soon
+  // falls free: what was known of that is known no more.
+  EXPECT_FALSE(map.Apply(Fix("d", 800, kBay)).applied);
+  ASSERT_TRUE(map.Drop(Key("a"), AtS(800)).applied);
+  ASSERT_TRUE(map.Apply(Fix("e", 150, kBay)).applied);
+  EXPECT_TRUE(map.Apply(Fix("d", 800, kBay)).applied);
+}
+
 TEST(ContactMap, RemembersAsManyDroppedOnesAsMayLive) {
   ContactMap map(ContactMapOptions{.max_contacts = 2});
   for (int i = 0; i < 5; ++i) {

@@ -198,6 +198,8 @@ TEST(DiffContacts, TellsExactlyWhatChanged) {
       if (outcome.estimate.has_value() && outcome.applied) {
         touched.insert(report.key);
       }
+      // What was stale made room.
+      for (const ContactEstimate& end : outcome.ended) touched.insert(end.key);
     }
     const ContactsView now = map.View();
     std::set<ContactKey> changed;
