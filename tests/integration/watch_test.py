@@ -8,9 +8,9 @@ import unittest
 import grpc
 
 from live_server import (DEADLINE_S, LiveTest, at, chart_tile, fix_report,
-                         import_chart, mission, obstacle, ping, point,
-                         report_contacts, send_pings, start_activity, types,
-                         wait_until)
+                         import_chart, mission, obstacle, obstacle_rpc, ping,
+                         point, report_contacts, send_pings, start_activity,
+                         types, wait_until)
 from questions_test import AS_FREE, path
 from watchers import (ContactsReader, RegionReader, TrajectoryReader,
                       region_of, wait_for_end)
@@ -219,8 +219,14 @@ class SlowReaders(LiveTest):
             start_activity(server, north_extent_m=5000, east_extent_m=5000,
                            cell_size_m=1, max_range_m=8000)
             area = bay(resolution_m=10, south=0, west=0, north=5000, east=5000)
-            # Nobody reads these: each sends until its window is full.
-            stuck = [server.obstacle.WatchRegion(
+            # Nobody reads these: each sends until its window is full. Without
+            # the probe the window stays at 64 KiB: a quick machine would else
+            # widen it until all that comes fits into it.
+            narrow = grpc.insecure_channel(
+                server.address, options=[("grpc.http2.bdp_probe", 0)])
+            self.addCleanup(narrow.close)
+            unread = obstacle_rpc.ObstacleServiceStub(narrow)
+            stuck = [unread.WatchRegion(
                 obstacle.WatchRegionRequest(region=area)) for _ in range(20)]
             for call in stuck:
                 next(call)
