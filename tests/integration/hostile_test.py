@@ -17,7 +17,7 @@ import unittest
 import grpc
 
 from live_server import (DEADLINE_S, LiveTest, import_chart, ingest_rpc,
-                         obstacle, obstacle_rpc, point, types)
+                         memory_bound_kb, obstacle, obstacle_rpc, point, types)
 
 # More than before, at the most, where a test does not say otherwise: 128 MB for
 # what is on the way (limits.h), 64 bulk streams of 1.5 MB, and as much again
@@ -36,14 +36,6 @@ STREAMS = 10_000
 QUERY = "/fathom.v1.ObstacleService/QueryObstacles"
 DATA, HEADERS, RST_STREAM, SETTINGS = 0, 1, 3, 4
 END_HEADERS = 4
-
-
-def resident_mb(server):
-    with open(f"/proc/{server.process.pid}/status", encoding="ascii") as status:
-        for line in status:
-            if line.startswith("VmRSS:"):
-                return int(line.split()[1]) / 1024
-    raise RuntimeError("no VmRSS")
 
 
 def frame(kind, flags, stream, payload=b""):
@@ -102,7 +94,7 @@ class Hostile(LiveTest):
         self.server = self.enterContext(self.new_mission())
         import_chart(self.server)
         self.others_are_answered()
-        self.before_mb = resident_mb(self.server)
+        self.before_mb = self.server.resident_kb() / 1024
         self.peak_mb = self.before_mb
 
     def others_are_answered(self):
@@ -121,14 +113,14 @@ class Hostile(LiveTest):
 
     def look(self):
         self.assertIsNone(self.server.process.poll(), self.server.log())
-        self.peak_mb = max(self.peak_mb, resident_mb(self.server))
+        self.peak_mb = max(self.peak_mb, self.server.resident_kb() / 1024)
 
     def tearDown(self):
         self.look()
         self.others_are_answered()
         grown = self.peak_mb - self.before_mb
         print(f"{self._testMethodName}: {grown:.0f} MB more at the most")
-        self.assertLess(grown, self.bound_mb)
+        self.assertLess(1024 * grown, memory_bound_kb(1024 * self.bound_mb))
         # Streams and calls that are gone hold nothing: SIGTERM ends at once.
         self.assertEqual(self.server.terminate(), 0, self.server.log())
         super().tearDown()

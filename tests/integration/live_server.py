@@ -35,6 +35,7 @@ from google.rpc import error_details_pb2, status_pb2  # noqa: E402
 FATHOMD = os.environ["FATHOMD"]
 FATHOM = os.environ["FATHOM_CLI"]
 FEEDER = os.environ["FATHOM_FEEDER"]
+SANITIZED = bool(os.environ.get("FATHOM_SANITIZE"))
 
 # Sanitizer builds are several times slower.
 DEADLINE_S = 60
@@ -51,6 +52,12 @@ def wait_until(condition, what):
         if time.monotonic() > deadline:
             raise TimeoutError(f"waited {DEADLINE_S} s for: {what}")
         time.sleep(0.01)
+
+
+def memory_bound_kb(plain_kb):
+    """What a process may hold that holds plain_kb in a plain build: with a
+    sanitizer each piece is larger, and what was freed is kept for a while."""
+    return 3 * plain_kb + 1_000_000 if SANITIZED else plain_kb
 
 
 class Server:
@@ -83,6 +90,15 @@ class Server:
 
     def log(self):
         return self.log_path.read_text(errors="replace")
+
+    def resident_kb(self):
+        """Memory of the process now."""
+        path = f"/proc/{self.process.pid}/status"
+        with open(path, encoding="ascii") as status:
+            for line in status:
+                if line.startswith("VmRSS:"):
+                    return int(line.split()[1])
+        raise RuntimeError("no VmRSS")
 
     def kill(self):
         """SIGKILL: as near to a power cut as a process can come."""

@@ -23,14 +23,6 @@ EXPECTED = {grpc.StatusCode.CANCELLED, grpc.StatusCode.DEADLINE_EXCEEDED,
             grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.RESOURCE_EXHAUSTED}
 
 
-def resident_kb(server):
-    with open(f"/proc/{server.process.pid}/status", encoding="ascii") as status:
-        for line in status:
-            if line.startswith("VmRSS:"):
-                return int(line.split()[1])
-    raise RuntimeError("no VmRSS")
-
-
 def region_request(side_m, resolution_m):
     return obstacle.GetRegionRequest(
         south_west=point(0, 0), north_east=point(side_m, side_m),
@@ -158,7 +150,7 @@ class Stress(LiveTest):
             import_chart(server)
             start_activity(server)
             self.run_workers(server, 2, lambda: None)  # Warms the allocator.
-            before_kb = resident_kb(server)
+            before_kb = server.resident_kb()
             workers, _ = self.run_workers(server, SECONDS, lambda: None)
             self.assertEqual([w.unexpected for w in workers if w.unexpected],
                              [])
@@ -196,7 +188,7 @@ class Stress(LiveTest):
                     ping(1, [(105, 105, 20.0, 1.0)], source=f"after-{number}")])
                 self.assertEqual(last.durable_sequence, 1)
             # 64 regions of one 1.4 MB block each, and what the heap keeps.
-            self.assertLess(resident_kb(server) - before_kb, 400_000)
+            self.assertLess(server.resident_kb() - before_kb, 400_000)
             self.assertEqual(ask(server, 405, 405, depth_m=5).answer.state,
                              types.OBSTACLE_STATE_FREE)
             self.assertEqual(server.terminate(), 0, server.log())
