@@ -27,25 +27,23 @@ absl::StatusOr<YamlMap> YamlMap::Parse(const std::string& text,
 }
 
 YamlMap::YamlMap(std::shared_ptr<File> file, YAML::Node node, std::string path)
-    : file_(std::move(file)),
-      node_(std::move(node)),
-      path_(std::move(path)),
-      known_(std::make_shared<std::set<std::string>>()) {
-  // Finish of any map of the file looks at all of them.
-  file_->read.push_back(std::unique_ptr<YamlMap>(new YamlMap(*this)));
+    : file_(std::move(file)), asked_(std::make_shared<Asked>()) {
+  asked_->node = std::move(node);
+  asked_->path = std::move(path);
+  file_->maps.push_back(asked_);
 }
 
-std::string YamlMap::PathOf(const std::string& key) const {
-  return path_.empty() ? key : path_ + "." + key;
+std::string YamlMap::PathOf(const Asked& map, const std::string& key) {
+  return map.path.empty() ? key : map.path + "." + key;
 }
 
 bool YamlMap::Has(const std::string& key) const {
-  return node_.IsMap() && static_cast<bool>(node_[key]);
+  return node().IsMap() && static_cast<bool>(node()[key]);
 }
 
 YAML::Node YamlMap::Take(const std::string& key) {
-  known_->insert(key);
-  return Has(key) ? node_[key] : YAML::Node(YAML::NodeType::Undefined);
+  asked_->keys.insert(key);
+  return Has(key) ? node()[key] : YAML::Node(YAML::NodeType::Undefined);
 }
 
 void YamlMap::Fail(int line, const std::string& what) {
@@ -55,7 +53,7 @@ void YamlMap::Fail(int line, const std::string& what) {
 }
 
 void YamlMap::Refuse(const std::string& key, const std::string& what) {
-  Fail(Has(key) ? node_[key].Mark().line + 1 : line(),
+  Fail(Has(key) ? node()[key].Mark().line + 1 : line(),
        absl::StrFormat("%s %s", PathOf(key), what));
 }
 
@@ -76,7 +74,7 @@ void YamlMap::Read(const std::string& key, double& value, double least,
   double read = 0;
   if (!Scalar(key, "a number", read)) return;
   if (!(read >= least && read <= most)) {
-    Fail(node_[key].Mark().line + 1,
+    Fail(node()[key].Mark().line + 1,
          absl::StrFormat("%s=%g must be in [%g, %g]", PathOf(key), read, least,
                          most));
     return;
@@ -87,7 +85,7 @@ void YamlMap::Read(const std::string& key, double& value, double least,
 void YamlMap::Read(const std::string& key, std::optional<double>& value,
                    double least, double most) {
   if (!Has(key)) {
-    known_->insert(key);
+    asked_->keys.insert(key);
     return;
   }
   double read = 0;
@@ -176,16 +174,16 @@ std::vector<YamlMap> YamlMap::Children(const std::string& key) {
 
 absl::Status YamlMap::Finish() {
   if (!file_->status.ok()) return file_->status;
-  for (const std::unique_ptr<YamlMap>& map : file_->read) {
-    for (const auto& entry : map->node_) {
+  for (const std::shared_ptr<Asked>& map : file_->maps) {
+    for (const auto& entry : map->node) {
       const auto key = entry.first.as<std::string>("");
-      if (map->known_->contains(key)) continue;
+      if (map->keys.contains(key)) continue;
       std::string known;
-      for (const std::string& name : *map->known_) {
+      for (const std::string& name : map->keys) {
         known += (known.empty() ? "" : ", ") + name;
       }
       Fail(entry.first.Mark().line + 1,
-           absl::StrFormat("unknown key %s; known here: %s", map->PathOf(key),
+           absl::StrFormat("unknown key %s; known here: %s", PathOf(*map, key),
                            known));
       return file_->status;
     }

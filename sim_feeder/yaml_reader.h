@@ -58,17 +58,24 @@ class YamlMap {
   // that of the map.
   void Refuse(const std::string& key, const std::string& what);
 
-  int line() const { return node_.Mark().line + 1; }
+  int line() const { return node().Mark().line + 1; }
 
   // The first error, or that of a key that nobody asked for, in this map or a
   // child of it.
   absl::Status Finish();
 
  private:
+  // A map of the file and the keys that were asked for.
+  struct Asked {
+    YAML::Node node;
+    std::string path;
+    std::set<std::string> keys;
+  };
   struct File {
     std::string name;
     absl::Status status;
-    std::vector<std::unique_ptr<YamlMap>> read;
+    // Finish of any map of the file looks at all of them.
+    std::vector<std::shared_ptr<Asked>> maps;
   };
 
   YamlMap(std::shared_ptr<File> file, YAML::Node node, std::string path);
@@ -77,13 +84,14 @@ class YamlMap {
   template <typename Value>
   bool Scalar(const std::string& key, const char* kind, Value& value);
   void Fail(int line, const std::string& what);
-  std::string PathOf(const std::string& key) const;
+  static std::string PathOf(const Asked& map, const std::string& key);
+  std::string PathOf(const std::string& key) const {
+    return PathOf(*asked_, key);
+  }
+  const YAML::Node& node() const { return asked_->node; }
 
   std::shared_ptr<File> file_;
-  YAML::Node node_;
-  std::string path_;
-  // Shared with the copy that Finish looks at.
-  std::shared_ptr<std::set<std::string>> known_;
+  std::shared_ptr<Asked> asked_;
 };
 
 }  // namespace fathom::feeder

@@ -15,8 +15,10 @@
 
 namespace fathom::map {
 
-ContactOutcome ContactMap::ApplyLinked(const ContactKey& contact,
+ContactOutcome ContactMap::ApplyLinked(const ContactKey& named,
                                        const ContactReport& report) {
+  // A copy: `named` may stand in the link that the report ends.
+  const ContactKey contact = named;
   if (report.inactive) {
     // This source has lost it; the track goes on with the others.
     ContactOutcome outcome;

@@ -197,9 +197,10 @@ TEST_F(MergeMap, ThePartOfALeafThatIsCoarserInheritsAsADivisionDoes) {
 // is free above what they know.
 void ExpectNothingLost(GlobalMap& from, GlobalMap& into) {
   const GlobalMapView ours = into.View();
-  const RootSquare& root = from.View().root();
+  const GlobalMapView theirs = from.View();
+  const RootSquare& root = theirs.root();
   std::size_t hazards = 0;
-  from.View().ForEachLeaf([&](const CellKey& cell, const Leaf& leaf) {
+  theirs.ForEachLeaf([&](const CellKey& cell, const Leaf& leaf) {
     if (!leaf.known()) return;
     float least_hazard_m = kNoHazard;
     bool known = false;

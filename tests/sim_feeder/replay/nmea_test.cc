@@ -41,20 +41,18 @@ TEST(ParseNmea, NamesWhyNot) {
 }
 
 TEST(ParseNmea, TakesTheTimeOfATagBlockWhoseChecksumHolds) {
-  constexpr std::string_view kBody =
-      "!AIVDM,1,1,,B,13F?Vv700<DJuLEtvep`iToV0<00,0*78";
+  const std::string body = "!AIVDM,1,1,,B,13F?Vv700<DJuLEtvep`iToV0<00,0*78";
+  // The sentence is a view: its line must live as long.
   const std::string good =
-      "\\s:rORBCOMM104,q:u,c:1418172113,T:2014-12-10 00.41.53*55\\";
-  const absl::StatusOr<NmeaSentence> told =
-      ParseNmea(good + std::string(kBody));
+      "\\s:rORBCOMM104,q:u,c:1418172113,T:2014-12-10 00.41.53*55\\" + body;
+  const absl::StatusOr<NmeaSentence> told = ParseNmea(good);
   FATHOM_ASSERT_OK(told);
   EXPECT_EQ(told->tag_time, Time(std::chrono::seconds(1'418'172'113)));
   EXPECT_EQ(told->field(4), "13F?Vv700<DJuLEtvep`iToV0<00");
 
   const std::string bad =
-      "\\s:rORBCOMM104,q:u,c:1418172113,T:2014-12-10 00.41.53*56\\";
-  const absl::StatusOr<NmeaSentence> untold =
-      ParseNmea(bad + std::string(kBody));
+      "\\s:rORBCOMM104,q:u,c:1418172113,T:2014-12-10 00.41.53*56\\" + body;
+  const absl::StatusOr<NmeaSentence> untold = ParseNmea(bad);
   FATHOM_ASSERT_OK(untold);
   EXPECT_FALSE(untold->tag_time.has_value());
 }
