@@ -30,9 +30,13 @@ class Proxy:
         while True:
             try:
                 near, _ = self.listener.accept()
-                far = socket.create_connection(self.to)
             except OSError:
                 return
+            try:
+                far = socket.create_connection(self.to)
+            except OSError:  # The server is away: the client asks again.
+                near.close()
+                continue
             self.accepted += 1
             self.sockets += [near, far]
             for a, b in ((near, far), (far, near)):
