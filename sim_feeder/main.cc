@@ -188,6 +188,29 @@ void AddVehicleAndSonar(CLI::App& app, Scenario& scenario) {
          "Between C4I fixes of one ship; 0: none");
 }
 
+// The server and how this sender is known to it; the option of the server.
+template <typename Options>
+CLI::Option* AddLink(CLI::App& app, Options& options,
+                     const std::string& without) {
+  app.add_option("--source", options.source_id, "Source id of all messages")
+      ->capture_default_str();
+  app.add_option("--epoch", options.epoch,
+                 "Numbering epoch; 0: the wall clock");
+  return app.add_option("--server", options.server,
+                        "host:port or unix:/path (without: " + without + ")");
+}
+
+// Where messages go without a server.
+template <typename Options>
+void AddRecordFiles(CLI::App& app, Options& options, CLI::Option* server) {
+  app.add_option("--pings-out", options.pings_out,
+                 "Without --server: write length-delimited pings")
+      ->excludes(server);
+  app.add_option("--reports-out", options.reports_out,
+                 "Without --server: write length-delimited reports")
+      ->excludes(server);
+}
+
 void AddOut(CLI::App& app, std::string& folder) {
   app.add_option("--out", folder,
                  "Write evaluation.json, places.csv and evaluation.png into "
@@ -198,12 +221,7 @@ void AddOut(CLI::App& app, std::string& folder) {
 CLI::App* AddRun(CLI::App& app, RunOptions& run) {
   CLI::App* command =
       app.add_subcommand("run", "Survey an area and send what is heard");
-  CLI::Option* server = command->add_option(
-      "--server", run.server, "host:port or unix:/path (without: no server)");
-  command->add_option("--source", run.source_id, "Source id of all messages")
-      ->capture_default_str();
-  command->add_option("--epoch", run.epoch,
-                      "Numbering epoch; 0: the wall clock");
+  CLI::Option* server = AddLink(*command, run, "no server");
   command->add_option("--activity", run.scenario.activity_id, "Activity id")
       ->required();
   AddActivity(*command, run);
@@ -225,14 +243,7 @@ CLI::App* AddRun(CLI::App& app, RunOptions& run) {
       ->capture_default_str();
   AddVehicleAndSonar(*command, run.scenario);
   command->add_option("--track-out", run.track_out, "Write the track, CSV");
-  command
-      ->add_option("--pings-out", run.pings_out,
-                   "Without --server: write length-delimited pings")
-      ->excludes(server);
-  command
-      ->add_option("--reports-out", run.reports_out,
-                   "Without --server: write length-delimited reports")
-      ->excludes(server);
+  AddRecordFiles(*command, run, server);
   command->add_flag("--progress", run.show_progress, "Show a progress bar");
   command->add_flag("--json", run.json, "Print the survey record, one line");
   return command;
@@ -251,13 +262,8 @@ CLI::App* AddReplay(CLI::App& app, ReplayOptions& replay) {
       ->add_option("--format", recording.format,
                    "What the files are (default: told from their content)")
       ->check(CLI::IsMember({"nmea", "table", "autoferry"}));
-  CLI::Option* server = command->add_option(
-      "--server", replay.server,
-      "host:port or unix:/path (without: only say what is in the files)");
-  command->add_option("--source", replay.source_id, "Source id of all messages")
-      ->capture_default_str();
-  command->add_option("--epoch", replay.epoch,
-                      "Numbering epoch; 0: the wall clock");
+  CLI::Option* server =
+      AddLink(*command, replay, "only say what is in the files");
   command
       ->add_option("--rate", replay.rate,
                    "Times the recorded pace; 0: flat out")
@@ -295,14 +301,7 @@ CLI::App* AddReplay(CLI::App& app, ReplayOptions& replay) {
       ->capture_default_str()
       ->check(CLI::PositiveNumber);
   AddActivity(*command, replay);
-  command
-      ->add_option("--pings-out", replay.pings_out,
-                   "Without --server: write length-delimited pings")
-      ->excludes(server);
-  command
-      ->add_option("--reports-out", replay.reports_out,
-                   "Without --server: write length-delimited reports")
-      ->excludes(server);
+  AddRecordFiles(*command, replay, server);
   command->add_flag("--progress", replay.show_progress, "Show a progress bar");
   command->add_flag("--json", replay.json, "Print what was sent, one line");
   return command;
@@ -316,13 +315,7 @@ CLI::App* AddScenario(CLI::App& app, ScenarioOptions& scenario) {
   command->add_option("file", scenario.path, "Scenario, YAML")
       ->required()
       ->type_name("FILE");
-  command->add_option("--server", scenario.server,
-                      "host:port or unix:/path (without: only check the file)");
-  command
-      ->add_option("--source", scenario.source_id, "Source id of all messages")
-      ->capture_default_str();
-  command->add_option("--epoch", scenario.epoch,
-                      "Numbering epoch; 0: the wall clock");
+  AddLink(*command, scenario, "only check the file");
   command->add_option("--seed", scenario.seed,
                       "Seed of everything drawn (default: the file's)");
   command->add_option("--rate", scenario.rate, "Times real time; 0: flat out")

@@ -10,11 +10,12 @@
 #include "tests/fuzz/fuzz.h"
 #include "tests/storage/sample_records.h"
 
+namespace fathom::storage {
+
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes,
                                       std::size_t size) {
-  using namespace fathom::storage;  // NOLINT(google-build-using-namespace)
   const Bytes blob =
-      fathom::fuzz::Sealed(BlobKind::kJournalSegment, 1, ByteSpan(bytes, size));
+      fuzz::Sealed(BlobKind::kJournalSegment, 1, ByteSpan(bytes, size));
   std::vector<JournalRecord> records;
   if (!DecodeJournal(blob, "segment", records).ok()) return 0;
 
@@ -38,8 +39,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes,
   Loaded loaded;
   loaded.metadata = SampleMetadata();
   loaded.journal = std::move(records);
-  fathom::map::MissionOptions options = *OptionsOf(loaded.metadata);
+  map::MissionOptions options = *OptionsOf(loaded.metadata);
   options.max_local_cells = 10'000;
   (void)RestoreMap(std::move(loaded), options);
   return 0;
 }
+
+}  // namespace fathom::storage

@@ -192,12 +192,9 @@ void Parse(const std::uint8_t* bytes, std::size_t size) {
 }
 
 }  // namespace
-}  // namespace fathom::fuzz
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes,
                                       std::size_t size) {
-  using namespace fathom;        // NOLINT(google-build-using-namespace)
-  using namespace fathom::fuzz;  // NOLINT(google-build-using-namespace)
   if (size == 0) return 0;
   const std::uint8_t kind =
       bytes[0] % static_cast<std::uint8_t>(Request::kCount);
@@ -245,3 +242,5 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes,
   }
   return 0;
 }
+
+}  // namespace fathom::fuzz

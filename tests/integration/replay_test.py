@@ -10,13 +10,11 @@ import json
 import os
 import pathlib
 import random
-import select
-import socket
 import statistics
 import subprocess
-import threading
 import unittest
 
+from link_proxy import LinkProxy
 from live_server import (DEADLINE_S, FEEDER, LiveTest, Server, obstacle, types)
 
 DATA = pathlib.Path(os.environ["FATHOM_SHARED_DATA_DIR"])
@@ -28,56 +26,6 @@ def feeder(*arguments):
     return subprocess.run([FEEDER, "replay", *map(str, arguments)],
                           capture_output=True, text=True,
                           timeout=4 * DEADLINE_S, check=False)
-
-
-class CuttingProxy:
-    """Forwards one listening port to a server and cuts the connection after
-    so many bytes from the client, `cuts` times; then it stays."""
-
-    def __init__(self, address, cuts, after_bytes):
-        host, port = address.rsplit(":", 1)
-        self.target = (host, int(port))
-        self.left = cuts
-        self.after_bytes = after_bytes
-        self.made = 0
-        self.listener = socket.create_server(("127.0.0.1", 0))
-        self.address = f"127.0.0.1:{self.listener.getsockname()[1]}"
-        self.thread = threading.Thread(target=self.accept, daemon=True)
-        self.thread.start()
-
-    def accept(self):
-        while True:
-            try:
-                client, _ = self.listener.accept()
-            except OSError:
-                return
-            threading.Thread(target=self.carry, args=(client,),
-                             daemon=True).start()
-
-    def carry(self, client):
-        cut_here = self.left > 0
-        if cut_here:
-            self.left -= 1
-        sent = 0
-        with client, socket.create_connection(self.target) as server:
-            while True:
-                ready, _, _ = select.select([client, server], [], [])
-                for source in ready:
-                    try:
-                        data = source.recv(16384)
-                    except OSError:
-                        return
-                    if not data:
-                        return
-                    if source is client:
-                        sent += len(data)
-                        if cut_here and sent > self.after_bytes:
-                            self.made += 1
-                            return  # Both ends close, the data is lost.
-                    (server if source is client else client).sendall(data)
-
-    def close(self):
-        self.listener.close()
 
 
 class Replay(LiveTest):
@@ -221,7 +169,7 @@ class Replay(LiveTest):
             sent = self.replay(server, *arguments)
             whole = server.status(digest=True).map_digest
         with self.server_about(60.08, 23.54, name="cut.fathom") as server:
-            proxy = CuttingProxy(server.address, cuts=20, after_bytes=20_000)
+            proxy = LinkProxy(server.address, cuts=20, after_bytes=20_000)
             self.addCleanup(proxy.close)
             cut = self.replay(proxy.address, *arguments)
             self.assertEqual(proxy.made, 20)

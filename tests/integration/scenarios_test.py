@@ -9,8 +9,8 @@ import struct
 import subprocess
 import unittest
 
+from link_proxy import LinkProxy
 from live_server import DEADLINE_S, FEEDER, LiveTest, Server
-from replay_test import CuttingProxy
 
 SCENARIOS = pathlib.Path(__file__).parents[2] / "sim_feeder" / "scenarios"
 ETOPO = pathlib.Path("/usr/share/ferret-vis/data/etopo5.cdf")
@@ -86,7 +86,7 @@ class Scenarios(LiveTest):
         self.assertGreater(sum(whole["survey"]["rejects"].values()), 0,
                            "crosstalk is gated")
         with self.server(name="cut.fathom") as server:
-            proxy = CuttingProxy(server.address, cuts=20, after_bytes=20_000)
+            proxy = LinkProxy(server.address, cuts=20, after_bytes=20_000)
             self.addCleanup(proxy.close)
             cut = self.scenario("bad_day", proxy.address, "--epoch", 1)
             self.assertGreaterEqual(proxy.made, 10)

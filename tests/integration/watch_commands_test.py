@@ -4,70 +4,14 @@ what a cut does to it."""
 import json
 import os
 import pty
-import socket
 import subprocess
 import threading
 import unittest
 
+from link_proxy import LinkProxy
 from live_server import (DEADLINE_S, FATHOM, LiveTest, START_S, chart_tile,
                          fix_report, import_chart, ping, report_contacts,
                          send_pings, start_activity, wait_until)
-
-
-class Proxy:
-    """Passes TCP on to a server until its connections are cut."""
-
-    def __init__(self, address):
-        host, port = address.rsplit(":", 1)
-        self.to = (host, int(port))
-        self.listener = socket.create_server(("127.0.0.1", 0))
-        self.address = f"127.0.0.1:{self.listener.getsockname()[1]}"
-        self.sockets = []
-        self.accepted = 0
-        threading.Thread(target=self._accept, daemon=True).start()
-
-    def _accept(self):
-        while True:
-            try:
-                near, _ = self.listener.accept()
-            except OSError:
-                return
-            try:
-                far = socket.create_connection(self.to)
-            except OSError:  # The server is away: the client asks again.
-                near.close()
-                continue
-            self.accepted += 1
-            self.sockets += [near, far]
-            for a, b in ((near, far), (far, near)):
-                threading.Thread(target=self._pass, args=(a, b),
-                                 daemon=True).start()
-
-    @staticmethod
-    def _pass(source, sink):
-        try:
-            while chunk := source.recv(65536):
-                sink.sendall(chunk)
-        except OSError:
-            pass
-        for end in (source, sink):
-            try:
-                end.shutdown(socket.SHUT_RDWR)
-            except OSError:
-                pass
-
-    def cut(self):
-        sockets, self.sockets = self.sockets, []
-        for end in sockets:
-            try:
-                end.shutdown(socket.SHUT_RDWR)
-            except OSError:
-                pass
-            end.close()
-
-    def close(self):
-        self.listener.close()
-        self.cut()
 
 
 class Command:
@@ -103,7 +47,7 @@ class WatchCommand(LiveTest):
 
     def test_contacts_go_on_after_a_cut_and_after_a_restart(self):
         with self.new_mission() as server:
-            proxy = Proxy(server.address)
+            proxy = LinkProxy(server.address)
             self.addCleanup(proxy.close)
             report_contacts(server, [fix_report(i, contact=f"ship{i}")
                                      for i in range(1, 21)])
