@@ -175,8 +175,25 @@ void BM_AnswerStatic(benchmark::State& state) {
 }
 BENCHMARK(BM_AnswerStatic);
 
-// The same while a writer applies pings without pause and publishes a view
-// after every 64; the reader asks the newest. /0: the writer writes this map.
+// Of a full fan; as often as the server publishes under full load
+// (kMaxMessagesPerView of server/limits.h).
+constexpr int kBeams = 101;
+constexpr int kPingsPerView = 256;
+
+// Soundings of the cells that WarmMission measured, a fan of them.
+Ping FanOver(int first, int seconds) {
+  Ping fan = HitAt("a", 0, 0, 20, 1, seconds);
+  fan.beams.clear();
+  for (int i = first; i < first + kBeams; ++i) {
+    fan.beams.push_back(
+        HitAt("a", 2.0 * (i % 250), 1.0 * ((37 * i) % 500), 20, 1, seconds)
+            .beams[0]);
+  }
+  return fan;
+}
+
+// The same while a writer applies fans without pause and publishes as the
+// server does; the reader asks the newest view. /0: the writer writes this map.
 // /1: another of the same size, so that nothing is shared but the machine:
 // what a busy neighbour costs by itself. /2: this map, but the reader keeps to
 // its first view: what the writer's copies cost, without reading them.
@@ -194,14 +211,11 @@ void BM_AnswerStaticBesideWriter(benchmark::State& state) {
   std::thread writer([&] {
     ObstacleMap& written = apart ? other : map;
     Published<ObstacleMapView>& views = apart ? unread : published;
-    for (int i = 0; !done; ++i) {
-      if (!written
-               .ApplyPing(HitAt("a", 2.0 * (i % 250), 1.0 * ((37 * i) % 500),
-                                20, 1, 250 + i / 100))
-               .ok()) {
-        std::abort();
-      }
-      if (++pings % 64 == 0) views.Publish(written.View());
+    std::vector<Ping> fans;
+    for (int i = 0; i < 250; ++i) fans.push_back(FanOver(i, 250));
+    while (!done) {
+      if (!written.ApplyPing(fans[pings % 250]).ok()) std::abort();
+      if (++pings % kPingsPerView == 0) views.Publish(written.View());
     }
   });
   const std::vector<ObstacleQuery> queries = ScatteredQueries(500);
