@@ -36,7 +36,11 @@ ChangeFeed::~ChangeFeed() {
 
 void ChangeFeed::Add(const std::shared_ptr<Watcher>& watcher) {
   MutexLock lock(mutex_);
-  if (!following_) {
+  if (following_) {
+    log_.Show(keeper_.View());
+    // The thread may not find it new, and the others are to hear of it.
+    soon_ = true;
+  } else {
     following_ = true;
     log_.Restart(keeper_.View());
   }
@@ -85,10 +89,10 @@ void ChangeFeed::Run() {
     SteadyTime now = std::chrono::steady_clock::now();
     const auto view = keeper_.NextView(shown, now + kTick);
     const bool changed = view->revision() > shown;
-    if (changed) log_.Show(view);
     bool soon = false;
     {
       MutexLock lock(mutex_);
+      if (changed) log_.Show(view);
       std::swap(soon, soon_);
     }
     now = std::chrono::steady_clock::now();

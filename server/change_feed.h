@@ -47,7 +47,9 @@ class ChangeFeed {
   ChangeFeed& operator=(const ChangeFeed&) = delete;
 
   // `watcher` is woken until it expires. Before this the log must not be read;
-  // as long as it has not expired the log follows the map.
+  // as long as it has not expired the log follows the map. The log now shows
+  // the map as it is: what was acknowledged to a client before it began to
+  // watch is behind it.
   void Add(const std::shared_ptr<Watcher>& watcher);
 
   // Wakes all.

@@ -139,7 +139,7 @@ std::vector<ChangeLog::AreaKey> ChangeLog::AreasChanged(
 
 void ChangeLog::Show(ViewPtr view) {
   const ViewPtr before = this->view();
-  if (view->revision() == before->revision()) return;
+  if (view->revision() <= before->revision()) return;
   const std::vector<AreaKey> areas = AreasChanged(*before, *view);
   std::vector<map::ContactKey> contacts;
   map::DiffContacts(

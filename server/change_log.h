@@ -60,7 +60,8 @@ class ChangeLog {
 
   // Begins with this view: what was before it is past.
   void Restart(ViewPtr view);
-  // The next view of the same map. REQUIRES: Restart.
+  // The next view of the same map; an older one is passed over. REQUIRES:
+  // Restart; one call at a time.
   void Show(ViewPtr view);
   // Lets go of the view. Restart before the next use.
   void Rest();

@@ -77,6 +77,23 @@ TEST(ChangeFeed, WakesWatchersWhenTheMapHasChanged) {
   EXPECT_EQ(changed, 1);
 }
 
+// The log still followed the map for the one before and lagged by an interval:
+// who resumed a watch was told of changes one by one that he could have been
+// told of in one.
+TEST(ChangeFeed, WhoeverJoinsFindsTheMapAsItIs) {
+  Kept kept;
+  ChangeFeed feed(kept.keeper, {.interval = std::chrono::hours(1)});
+  const auto first = std::make_shared<Sleeper>();
+  feed.Add(first);
+  kept.Report(1);
+  ASSERT_TRUE(first->AwaitRevision(feed.log(), kept.Revision()));
+  // From here on the feed's thread sleeps for an hour.
+  kept.Report(2);
+  const auto second = std::make_shared<Sleeper>();
+  feed.Add(second);
+  EXPECT_EQ(feed.log().view()->revision(), kept.Revision());
+}
+
 TEST(ChangeFeed, WithNobodyWatchingItHoldsNoViewAndForgets) {
   Kept kept;
   ChangeFeed feed(kept.keeper, {.linger = std::chrono::milliseconds(0)});
