@@ -49,26 +49,27 @@ namespace fathom::map {
 inline constexpr double kTypicalSlope = 0.03;
 
 // A cell and its eight neighbours, three rows from south to north of three
-// from west to east; index 4 is the cell itself. Null: no evidence there.
+// from west to east; index 4 is the cell itself. Null or of count 0: no
+// evidence there.
 using Neighbourhood = std::array<const PackedEvidence*, 9>;
 inline constexpr std::size_t kCenter = 4;
 
 // What the surroundings say about the variability inside a cell.
 struct RegionalVariability {
-  double variance_m2 = 0.0;     // Their estimate of tau^2; noise may make it
+  float variance_m2 = 0.0f;     // Their estimate of tau^2; noise may make it
                                 // a little negative.
-  double uncertainty_m4 = 0.0;  // The variance of that estimate, > 0.
+  float uncertainty_m4 = 0.0f;  // The variance of that estimate, > 0.
 };
 
 // From the steps between the measured cells of the neighbourhood (the centre
-// included) and the neighbours' excess scatter. REQUIRES: what is not null has
-// soundings, and the centre is not null.
+// included) and the neighbours' excess scatter. REQUIRES: the centre has
+// soundings.
 RegionalVariability VariabilityAround(const Neighbourhood& cells,
                                       double cell_size_m);
 
 // tau^2 of a cell with this evidence. REQUIRES: !evidence.empty().
-double VariabilityInside(const Evidence& evidence,
-                         const RegionalVariability& around);
+float VariabilityInside(const Evidence& evidence,
+                        const RegionalVariability& around);
 
 // Variance of the evidence's weighted mean: 1 / W + tau^2 / n.
 double MeanVarianceOf(const Evidence& evidence, double variability_m2);

@@ -97,6 +97,17 @@ class EvidenceCells {
   const PackedEvidence* Find(std::size_t k) const {
     return touched(k) ? &fresh_[slots_[k]] : nullptr;
   }
+  // The same of k, k + 1 and k + 2, without a branch.
+  std::array<const PackedEvidence*, 3> FindThree(std::size_t k) const {
+    const PackedEvidence* const cells = fresh_.data();
+    const std::size_t touched = fresh_.size();
+    std::array<const PackedEvidence*, 3> found;
+    for (std::size_t n = 0; n < 3; ++n) {
+      const std::size_t slot = slots_[k + n];
+      found[n] = slot < touched ? cells + slot : nullptr;
+    }
+    return found;
+  }
   const PackedEvidence* FindTransferred(std::size_t k) const {
     return touched(k) && any_transferred() ? &transferred_[slots_[k]] : nullptr;
   }

@@ -32,32 +32,32 @@ using Merged = std::array<PackedEvidence, 9>;
 Neighbourhood Around(const LocalGrid& grid, const BlockDirectory& directory,
                      CellIndex cell, Merged& merged) {
   Neighbourhood cells = {};
-  const auto put = [&cells, &merged](std::size_t n, const LocalBlock& block,
-                                     std::size_t k) {
-    const PackedEvidence* found = block.evidence.Find(k);
-    if (found == nullptr) return;
-    if (block.evidence.any_transferred()) {
-      merged[n] = PackMoments(block.evidence.All(k));
-      found = &merged[n];
-    }
-    if (CountOf(*found) != 0) cells[n] = found;
-  };
   const std::uint32_t row = static_cast<std::uint32_t>(cell.i) % kBlockSide;
   const std::uint32_t col = static_cast<std::uint32_t>(cell.j) % kBlockSide;
   if (row > 0 && col > 0 && row + 1 < kBlockSide && col + 1 < kBlockSide) {
     const Place south_west =
         PlaceOf(directory, {.i = cell.i - 1, .j = cell.j - 1});
-    for (std::size_t n = 0; n < 9; ++n) {
-      put(n, *south_west.block, south_west.k + n / 3 * kBlockSide + n % 3);
+    const EvidenceCells& evidence = south_west.block->evidence;
+    if (!evidence.any_transferred()) {
+      for (std::size_t n = 0; n < 9; n += 3) {
+        const auto three =
+            evidence.FindThree(south_west.k + n / 3 * kBlockSide);
+        std::copy(three.begin(), three.end(), cells.begin() + n);
+      }
+      return cells;
     }
-    return cells;
   }
   for (std::size_t n = 0; n < 9; ++n) {
     const CellIndex at = {.i = cell.i + static_cast<std::int32_t>(n / 3) - 1,
                           .j = cell.j + static_cast<std::int32_t>(n % 3) - 1};
     if (!grid.Contains(at)) continue;
     const Place place = PlaceOf(directory, at);
-    if (place.block != nullptr) put(n, *place.block, place.k);
+    if (place.block == nullptr) continue;
+    cells[n] = place.block->evidence.Find(place.k);
+    if (cells[n] != nullptr && place.block->evidence.any_transferred()) {
+      merged[n] = PackMoments(place.block->evidence.All(place.k));
+      cells[n] = &merged[n];
+    }
   }
   return cells;
 }
@@ -75,7 +75,7 @@ MeanVariance ReadKalman(const Evidence& evidence, const CellPrior& prior) {
 
 DepthEstimate ToEstimate(const MeanVariance& read, EvidenceKind kind,
                          const Evidence& evidence, double cell_size_m) {
-  const float std_m = static_cast<float>(std::sqrt(read.variance_m2));
+  const float std_m = std::sqrt(static_cast<float>(read.variance_m2));
   return {.depth_m = static_cast<float>(read.mean_m),
           .std_m = std::max(std_m, kMinStdM),
           .kind = kind,
@@ -92,7 +92,7 @@ DepthEstimate FromAdaptive(const AdaptiveReading& read,
                            double cell_size_m) {
   DepthEstimate estimate = ToEstimate(read.predictive, EvidenceKind::kMeasured,
                                       evidence, cell_size_m);
-  estimate.variability_m = static_cast<float>(std::sqrt(read.variability_m2));
+  estimate.variability_m = std::sqrt(static_cast<float>(read.variability_m2));
   estimate.hazard_m = read.hazard_m;
   if (std::isfinite(known_hazard_m)) {
     estimate.hazard_m = std::fmin(estimate.hazard_m, known_hazard_m);
@@ -275,10 +275,13 @@ std::optional<DepthEstimate> LocalMapView::At(
 
 std::optional<DepthEstimate> LocalMapView::AtCell(CellIndex cell) const {
   if (grid_ == nullptr || !grid_->Contains(cell)) return std::nullopt;
-  const std::optional<DepthEstimate> measured =
+  // One variable, built where the caller wants it.
+  std::optional<DepthEstimate> estimate =
       ReadMeasured(*grid_, *directory_, cell);
-  if (measured.has_value()) return measured;
-  return ReadUnmeasured(*grid_, *directory_, cell);
+  if (!estimate.has_value()) {
+    estimate = ReadUnmeasured(*grid_, *directory_, cell);
+  }
+  return estimate;
 }
 
 std::optional<DepthEstimate> LocalMapView::EvidenceAt(
