@@ -44,6 +44,7 @@ class Table {
   }
 
   const Series& operator[](int k) const {
+    // By way of int: to the unsigned is dearer.
     return series_[static_cast<std::size_t>(k)];
   }
 
@@ -59,11 +60,10 @@ double TabulatedNormalCdf(double x) {
   // Written so that NaN goes this way.
   if (!(std::fabs(x) < kReach)) return NormalCdf(x);
   static const Table table;
-  const double steps = x * kPlacesPerUnit + kReach * kPlacesPerUnit;
-  // The nearest place. By way of int: to the unsigned is dearer.
-  const int k = static_cast<int>(steps + 0.5);
-  // Exact: both are multiples of the last digit of `steps`.
-  const double t = steps - static_cast<double>(k);
+  // The nearest place is the one half a step below or less.
+  const double steps = x * kPlacesPerUnit + (kReach * kPlacesPerUnit + 0.5);
+  const int k = static_cast<int>(steps);
+  const double t = steps - (static_cast<double>(k) + 0.5);
   const auto& c = table[k].c;
   // In pairs (Estrin), which do not wait for each other. What is left out is
   // below (8 h)^7 / 7! = 1e-10 of the value, h = 1/64.
