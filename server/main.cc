@@ -15,6 +15,7 @@
 
 #include <CLI/CLI.hpp>
 #include <atomic>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
@@ -43,6 +44,10 @@ namespace {
 constexpr int kExitCannotStart = 1;
 constexpr int kExitMisuse = 2;
 constexpr int kExitFileFailed = 3;
+
+// More is no limit: a century, an exabyte.
+constexpr double kMaxHistoryAgeDays = 36'525;
+constexpr std::uint64_t kMaxHistoryMb = 1'000'000'000'000;
 
 constexpr double kMetresPerNmi = 1852;  // Exact, by definition.
 
@@ -78,6 +83,8 @@ struct Flags {
   std::string center;
   double side_nmi = 0;
   double ageing_m2_per_day = 0;
+  std::optional<double> history_max_age_days;
+  std::optional<std::uint64_t> history_max_mb;
   NewMission mission;
   ListenOptions listen;
   std::string log_level = "info";
@@ -101,6 +108,20 @@ void AddFlags(CLI::App& app, Flags& flags) {
                  "debug, info, warning or error; the log goes to standard "
                  "error")
       ->capture_default_str();
+
+  const char* const kHistory = "The contact history (all is kept by default)";
+  app.add_option("--history-max-age-days", flags.history_max_age_days,
+                 "Estimates older than this beside the newest evidence are "
+                 "forgotten, a block at a time, with each checkpoint")
+      ->check(CLI::Range(1e-3, kMaxHistoryAgeDays))
+      ->group(kHistory)
+      ->type_name("DAYS");
+  app.add_option("--history-max-mb", flags.history_max_mb,
+                 "Most megabytes of it (1 MB: about 10 000 estimates); the "
+                 "oldest go first")
+      ->check(CLI::Range(std::uint64_t{1}, kMaxHistoryMb))
+      ->group(kHistory)
+      ->type_name("MB");
 
   const char* const kNew = "A new mission";
   CLI::Option* const create =
@@ -182,6 +203,19 @@ absl::StatusOr<std::unique_ptr<storage::MissionFile>> OpenFile(
   return CreateMission(flags.mission_path, mission, clock.Now());
 }
 
+storage::HistoryLimits HistoryLimitsOf(const Flags& flags) {
+  storage::HistoryLimits limits;
+  if (flags.history_max_age_days.has_value()) {
+    constexpr double kMicrosPerDay = 86'400e6;
+    limits.max_age = Duration(
+        static_cast<std::int64_t>(*flags.history_max_age_days * kMicrosPerDay));
+  }
+  if (flags.history_max_mb.has_value()) {
+    limits.max_bytes = *flags.history_max_mb * 1'000'000;
+  }
+  return limits;
+}
+
 // Written beside and renamed, so that a reader never sees half a number.
 absl::Status WritePortFile(const std::string& path, const Server& server) {
   const std::string part = path + ".part";
@@ -237,6 +271,7 @@ absl::Status Serve(Flags& flags, bool& file_failed) {
 
   const SystemClock clock;
   FATHOM_ASSIGN_OR_RETURN(const auto file, OpenFile(flags, clock));
+  file->LimitHistory(HistoryLimitsOf(flags));
   NewFileGuard guard(flags.create ? flags.mission_path : "");
   FATHOM_ASSIGN_OR_RETURN(MapKeeper::Restored restored, RestoreMission(*file));
   Log(LogLevel::kInfo, "mission opened path=%s revision=%d replayed=%d",

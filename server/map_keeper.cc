@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_format.h"
 #include "base/status_macros.h"
+#include "storage/history_replay.h"
 
 namespace fathom::server {
 namespace {
@@ -50,34 +51,6 @@ std::string Describe(map::RejectReason reason, size_t max_contacts) {
           map::kMaxLinkedNames);
     default:
       return absl::StrFormat("refused: %s", map::RejectReasonName(reason));
-  }
-}
-
-// What an outcome adds to the history, under each name that it has there.
-void AddHistory(map::ContactOutcome outcome, uint64_t revision,
-                std::vector<storage::ContactHistoryRow>& rows) {
-  if (outcome.joint && !outcome.estimates.empty()) {
-    for (const map::ContactKey& name : outcome.estimates.front().linked) {
-      bool revises = outcome.revised;
-      for (map::ContactEstimate estimate : outcome.estimates) {
-        std::replace(estimate.linked.begin(), estimate.linked.end(), name,
-                     estimate.key);
-        estimate.key = name;
-        rows.push_back({.revision = revision,
-                        .estimate = std::move(estimate),
-                        .revises = std::exchange(revises, false)});
-      }
-    }
-  }
-  // Of a revision the first row clears the way for all.
-  bool revises = outcome.revised;
-  for (map::ContactEstimate& estimate : outcome.estimates) {
-    rows.push_back({.revision = revision,
-                    .estimate = std::move(estimate),
-                    .revises = std::exchange(revises, false)});
-  }
-  for (map::ContactEstimate& estimate : outcome.ended) {
-    rows.push_back({.revision = revision, .estimate = std::move(estimate)});
   }
 }
 
@@ -266,7 +239,8 @@ void MapKeeper::DropContact(map::DropContact event, Done<Nothing> done) {
        event = std::move(event)](StorageItem& item) -> absl::StatusOr<Nothing> {
         FATHOM_ASSIGN_OR_RETURN(map::ContactOutcome outcome, map_->Drop(event));
         item.record = storage::JournalRecord{map_->revision(), event};
-        AddHistory(std::move(outcome), map_->revision(), item.contact_history);
+        storage::AppendHistoryRows(std::move(outcome), map_->revision(),
+                                   item.contact_history);
         return Nothing{};
       });
 }
@@ -482,7 +456,8 @@ void MapKeeper::ApplyContact(IngestMessage& message, MessageOutcome& outcome,
   }
   // A refused one may have them too: a late outlier changes what the outlier
   // after it was taken for.
-  AddHistory(std::move(result), map_->revision(), item.contact_history);
+  storage::AppendHistoryRows(std::move(result), map_->revision(),
+                             item.contact_history);
   item.record = storage::JournalRecord{
       map_->revision(),
       storage::ContactRecord{.epoch = message.number.epoch,

@@ -26,7 +26,8 @@ enum class BlobKind : std::uint8_t {
   kLocalBlock = 'B',
   kJournalSegment = 'J',
   kContact = 'C',
-  kContactEstimate = 'E',
+  kContactEstimate = 'E',  // Formats 5 and 6.
+  kContactHistory = 'H',
   kActivity = 'A',
 };
 

@@ -14,8 +14,7 @@ namespace {
 // contact's other names behind, written where it has any.
 constexpr std::uint8_t kContactVersion = 2;
 constexpr std::uint8_t kLinkedContactVersion = 3;
-// 2 is 1 and the other names behind, written where there are any.
-constexpr std::uint8_t kEstimateVersion = 1;
+// 2 is 1 and the other names behind, written where there were any.
 constexpr std::uint8_t kLinkedEstimateVersion = 2;
 
 // A recent report was gated, or gave so many points.
@@ -43,6 +42,14 @@ map::GeodeticPoint GetPoint(ByteReader& reader) {
   return point;
 }
 
+map::ContactClass GetContactClass(ByteReader& reader) {
+  const auto contact_class = static_cast<map::ContactClass>(reader.GetU8());
+  if (!map::IsContactClass(contact_class)) reader.Fail();
+  return contact_class;
+}
+
+}  // namespace
+
 void PutNames(const std::vector<map::ContactKey>& names, ByteWriter& writer) {
   writer.PutVarint(names.size());
   for (const map::ContactKey& name : names) {
@@ -58,12 +65,6 @@ std::vector<map::ContactKey> GetNames(ByteReader& reader) {
     name.contact.value = reader.GetString();
   }
   return names;
-}
-
-map::ContactClass GetContactClass(ByteReader& reader) {
-  const auto contact_class = static_cast<map::ContactClass>(reader.GetU8());
-  if (!map::IsContactClass(contact_class)) reader.Fail();
-  return contact_class;
 }
 
 void PutContactPoint(const map::ContactPoint& point, ByteWriter& writer) {
@@ -103,8 +104,6 @@ void GetContactPoint(ByteReader& reader, map::ContactPoint& point) {
   point.radius_m = reader.GetF64();
   point.report_count = reader.GetU64();
 }
-
-}  // namespace
 
 void PutContactReport(const map::ContactReport& report, ByteWriter& writer) {
   const auto* const fix = std::get_if<map::ContactFix>(&report.observation);
@@ -171,16 +170,6 @@ void GetContactReport(ByteReader& reader, map::ContactReport& report) {
   if ((flags & kHasDepthStd) != 0) report.depth_std_m = reader.GetF64();
   report.inactive = (flags & kInactive) != 0;
   if ((flags & kHasSameAs) != 0) report.same_as = GetNames(reader);
-}
-
-Bytes EncodeContactEstimate(const map::ContactEstimate& estimate) {
-  ByteWriter writer = StartBlob();
-  PutContactPoint(estimate, writer);
-  if (!estimate.linked.empty()) PutNames(estimate.linked, writer);
-  return SealBlob(
-      BlobKind::kContactEstimate,
-      estimate.linked.empty() ? kEstimateVersion : kLinkedEstimateVersion,
-      std::move(writer));
 }
 
 absl::StatusOr<map::ContactEstimate> DecodeContactEstimate(

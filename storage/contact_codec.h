@@ -1,11 +1,12 @@
-// Contacts as bytes: reports and drops (for the journal), estimates (for the
-// history), whole contacts (for the checkpoint). Lossless.
+// Contacts as bytes: reports and drops (for the journal), points and names (for
+// the history, history_codec.h), whole contacts (for the checkpoint). Lossless.
 // docs/storage_format.md has the layouts. Thread-safe.
 
 #ifndef FATHOM_STORAGE_CONTACT_CODEC_H_
 #define FATHOM_STORAGE_CONTACT_CODEC_H_
 
 #include <string_view>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "map/contacts/contact.h"
@@ -22,8 +23,16 @@ void PutContactReport(const map::ContactReport& report, ByteWriter& writer);
 // Leaves `key` as it is; fails the reader on what no encoder wrote.
 void GetContactReport(ByteReader& reader, map::ContactReport& report);
 
-// An estimate without its key; its other names with it.
-Bytes EncodeContactEstimate(const map::ContactEstimate& estimate);
+// kContactPointBytes.
+void PutContactPoint(const map::ContactPoint& point, ByteWriter& writer);
+void GetContactPoint(ByteReader& reader, map::ContactPoint& point);
+
+// At most map::kMaxLinkedNames names, and how many.
+void PutNames(const std::vector<map::ContactKey>& names, ByteWriter& writer);
+std::vector<map::ContactKey> GetNames(ByteReader& reader);
+
+// An estimate without its key, its other names with it: a row of the history of
+// formats 5 and 6 (migrate.h).
 absl::StatusOr<map::ContactEstimate> DecodeContactEstimate(
     ByteSpan blob, std::string_view what);
 

@@ -8,6 +8,7 @@
 #include "base/status_macros.h"
 #include "storage/bytes.h"
 #include "storage/draft_file.h"
+#include "storage/history_reader.h"
 
 namespace fathom::storage {
 namespace {
@@ -103,7 +104,8 @@ class Exporter {
  public:
   explicit Exporter(Connection& out) : out_(out) {}
 
-  absl::StatusOr<ExportedContacts> Run(Connection& mission) {
+  absl::StatusOr<ExportedContacts> Run(
+      Connection& mission, const std::vector<ContactHistoryRow>& replayed) {
     FATHOM_RETURN_IF_ERROR(out_.Execute(kTables));
     FATHOM_ASSIGN_OR_RETURN(Transaction transaction, Transaction::Begin(out_));
     FATHOM_ASSIGN_OR_RETURN(
@@ -116,45 +118,33 @@ class Exporter {
         out_.Prepare("INSERT INTO contact_tracks (geom, source_id, contact_id, "
                      "start_time, end_time, estimates) VALUES (?, ?, ?, ?, ?, "
                      "?)"));
-    FATHOM_ASSIGN_OR_RETURN(
-        Statement select,
-        mission.Prepare(
-            "SELECT contact_number, source_id, contact_id, time_us, "
-            "contact_class, status, latitude_deg, longitude_deg, "
-            "velocity_north_m_s, velocity_east_m_s FROM contact_history JOIN "
-            "contact USING (contact_number) ORDER BY contact_number, time_us, "
-            "revision"));
-    while (true) {
-      FATHOM_ASSIGN_OR_RETURN(const bool more, select.Step());
-      if (!more) break;
-      if (select.ColumnInt(0) != number_ || points_.empty()) {
-        FATHOM_RETURN_IF_ERROR(EndTrack());
-        number_ = select.ColumnInt(0);
-        source_ = select.ColumnText(1);
-        contact_ = select.ColumnText(2);
-        start_us_ = select.ColumnInt(3);
-      }
-      end_us_ = select.ColumnInt(3);
-      FATHOM_RETURN_IF_ERROR(AddPoint(select));
-    }
+    FATHOM_RETURN_IF_ERROR(ReadWholeHistory(
+        mission, replayed,
+        [this](const ContactHistoryRow& row) { return Add(row.estimate); },
+        [](const absl::Status& damage) { return damage; }));
     FATHOM_RETURN_IF_ERROR(EndTrack());
     FATHOM_RETURN_IF_ERROR(transaction.Commit());
     return counts_;
   }
 
  private:
-  absl::Status AddPoint(const Statement& row) {
-    const LonLat point = {row.ColumnReal(7), row.ColumnReal(6)};
+  absl::Status Add(const map::ContactEstimate& estimate) {
+    if (estimate.key != key_) FATHOM_RETURN_IF_ERROR(EndTrack());
+    key_ = estimate.key;
+    end_us_ = ToUnixMicros(estimate.time);
+    if (points_.empty()) start_us_ = end_us_;
+    const map::GeodeticPoint position = estimate.Position();
+    const LonLat point = {position.longitude_deg, position.latitude_deg};
     const Bytes geometry = PointBlob(point);
     const std::string time = TimeText(end_us_);
     add_point_.BindBlob(0, geometry);
-    add_point_.BindText(1, source_);
-    add_point_.BindText(2, contact_);
+    add_point_.BindText(1, key_.source.value);
+    add_point_.BindText(2, key_.contact.value);
     add_point_.BindText(3, time);
-    add_point_.BindInt(4, row.ColumnInt(4));
-    add_point_.BindInt(5, row.ColumnInt(5));
-    add_point_.BindReal(6, row.ColumnReal(8));
-    add_point_.BindReal(7, row.ColumnReal(9));
+    add_point_.BindInt(4, static_cast<std::int64_t>(estimate.contact_class));
+    add_point_.BindInt(5, static_cast<std::int64_t>(estimate.status));
+    add_point_.BindReal(6, estimate.x(2));
+    add_point_.BindReal(7, estimate.x(3));
     points_.push_back(point);
     ++counts_.points;
     return add_point_.Run();
@@ -169,8 +159,8 @@ class Exporter {
     const std::string start = TimeText(start_us_);
     const std::string end = TimeText(end_us_);
     add_track_.BindBlob(0, geometry);
-    add_track_.BindText(1, source_);
-    add_track_.BindText(2, contact_);
+    add_track_.BindText(1, key_.source.value);
+    add_track_.BindText(2, key_.contact.value);
     add_track_.BindText(3, start);
     add_track_.BindText(4, end);
     add_track_.BindUint(5, points_.size());
@@ -183,9 +173,7 @@ class Exporter {
   Statement add_point_;
   Statement add_track_;
   ExportedContacts counts_;
-  std::int64_t number_ = 0;
-  std::string source_;
-  std::string contact_;
+  map::ContactKey key_;
   std::int64_t start_us_ = 0;
   std::int64_t end_us_ = 0;
   std::vector<LonLat> points_;
@@ -193,8 +181,9 @@ class Exporter {
 
 }  // namespace
 
-absl::StatusOr<ExportedContacts> ExportContacts(Connection& mission,
-                                                const std::string& path) {
+absl::StatusOr<ExportedContacts> ExportContacts(
+    Connection& mission, const std::vector<ContactHistoryRow>& replayed,
+    const std::string& path) {
   FATHOM_RETURN_IF_ERROR(CheckAbsent(path));
   DraftFile draft(path);
   ExportedContacts counts;
@@ -202,7 +191,7 @@ absl::StatusOr<ExportedContacts> ExportContacts(Connection& mission,
     FATHOM_ASSIGN_OR_RETURN(
         Connection out,
         Connection::Open(draft.path(), Connection::Mode::kCreate));
-    FATHOM_ASSIGN_OR_RETURN(counts, Exporter(out).Run(mission));
+    FATHOM_ASSIGN_OR_RETURN(counts, Exporter(out).Run(mission, replayed));
   }
   FATHOM_RETURN_IF_ERROR(draft.Publish());
   return counts;

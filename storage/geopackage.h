@@ -9,8 +9,10 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
+#include "storage/mission_records.h"
 #include "storage/sqlite.h"
 
 namespace fathom::storage {
@@ -24,8 +26,10 @@ struct ExportedContacts {
 // Writes the history that `mission` holds, as of one moment, to a new file at
 // `path`, which appears complete or not at all. Memory: one contact's
 // positions. Errors: ALREADY_EXISTS; those of sqlite.h.
-absl::StatusOr<ExportedContacts> ExportContacts(Connection& mission,
-                                                const std::string& path);
+// `replayed`: what its journal adds (history_replay.h).
+absl::StatusOr<ExportedContacts> ExportContacts(
+    Connection& mission, const std::vector<ContactHistoryRow>& replayed,
+    const std::string& path);
 
 }  // namespace fathom::storage
 

@@ -345,6 +345,15 @@ absl::StatusOr<Loaded> LoadMission(Connection& connection) {
   return loaded;
 }
 
+absl::StatusOr<Loaded> LoadContactsAndJournal(Connection& connection) {
+  Loaded loaded;
+  FATHOM_ASSIGN_OR_RETURN(loaded.metadata, ReadMetadata(connection));
+  FATHOM_RETURN_IF_ERROR(LoadCheckpointMark(connection, loaded));
+  FATHOM_RETURN_IF_ERROR(LoadContacts(connection, loaded));
+  FATHOM_RETURN_IF_ERROR(LoadJournal(connection, loaded));
+  return loaded;
+}
+
 absl::StatusOr<Loaded> SalvageMission(Connection& connection) {
   Loaded loaded;
   FATHOM_ASSIGN_OR_RETURN(loaded.metadata, ReadMetadata(connection));

@@ -21,6 +21,9 @@ absl::StatusOr<Loaded> LoadMission(Connection& connection);
 // DATA_LOSS if the mission's own row cannot be read.
 absl::StatusOr<Loaded> SalvageMission(Connection& connection);
 
+// Of a mission only what ReplayHistory needs: contacts and journal.
+absl::StatusOr<Loaded> LoadContactsAndJournal(Connection& connection);
+
 absl::StatusOr<std::vector<SourcePosition>> LoadSourcePositions(
     Connection& connection);
 

@@ -2,11 +2,17 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <utility>
 
 #include "absl/strings/str_format.h"
 #include "base/status_macros.h"
+#include "storage/contact_table.h"
 #include "storage/draft_file.h"
+#include "storage/history_codec.h"
+#include "storage/history_reader.h"
+#include "storage/history_table.h"
 #include "storage/mission_file.h"
+#include "storage/schema.h"
 
 namespace fathom::storage {
 namespace {
@@ -30,6 +36,48 @@ absl::Status ToVersion6(Connection& connection) {
   return connection.CheckpointTruncate();
 }
 
+// To a history in blocks (history_table.h), in one transaction.
+absl::Status ToVersion7(Connection& connection) {
+  FATHOM_ASSIGN_OR_RETURN(Transaction transaction,
+                          Transaction::Begin(connection));
+  FATHOM_RETURN_IF_ERROR(connection.Execute(
+      "ALTER TABLE contact_history RENAME TO contact_history_6"));
+  FATHOM_RETURN_IF_ERROR(CreateHistoryTables(connection));
+  {
+    FATHOM_ASSIGN_OR_RETURN(ContactTable contacts,
+                            ContactTable::Create(connection));
+    FATHOM_ASSIGN_OR_RETURN(HistoryTable table,
+                            HistoryTable::Create(connection));
+    map::ContactKey key;
+    HistoryTail tail;
+    const auto write = [&]() -> absl::Status {
+      if (tail.rows.empty()) return absl::OkStatus();
+      FATHOM_ASSIGN_OR_RETURN(const std::int64_t number,
+                              contacts.NumberOf(key));
+      return table.Write(number, std::exchange(tail, {}));
+    };
+    const auto take = [&](const ContactHistoryRow& row) -> absl::Status {
+      if (row.estimate.key != key || tail.rows.size() == kBlockEstimates) {
+        FATHOM_RETURN_IF_ERROR(write());
+        key = row.estimate.key;
+      }
+      tail.Add(row);
+      return absl::OkStatus();
+    };
+    const auto damaged = [](const absl::Status& status) {
+      return absl::DataLossError(
+          absl::StrFormat("%s; `fathom mission repair OLD NEW` saves the rest",
+                          status.message()));
+    };
+    FATHOM_RETURN_IF_ERROR(
+        ReadOldHistory(connection, "contact_history_6", take, damaged));
+    FATHOM_RETURN_IF_ERROR(write());
+  }
+  FATHOM_RETURN_IF_ERROR(connection.Execute("DROP TABLE contact_history_6"));
+  FATHOM_RETURN_IF_ERROR(connection.Execute("PRAGMA user_version = 7"));
+  return transaction.Commit();
+}
+
 }  // namespace
 
 absl::Status Migrate(const std::string& path, Connection& connection) {
@@ -38,6 +86,7 @@ absl::Status Migrate(const std::string& path, Connection& connection) {
   if (version == kSchemaVersion) return absl::OkStatus();
   FATHOM_RETURN_IF_ERROR(BackUp(path, version, connection));
   if (version < 6) FATHOM_RETURN_IF_ERROR(ToVersion6(connection));
+  if (version < 7) FATHOM_RETURN_IF_ERROR(ToVersion7(connection));
   return absl::OkStatus();
 }
 

@@ -13,9 +13,12 @@
 #include "base/mutex.h"
 #include "base/status_macros.h"
 #include "storage/checkpoint_writer.h"
+#include "storage/contact_history.h"
 #include "storage/contact_table.h"
 #include "storage/draft_file.h"
 #include "storage/file_lock.h"
+#include "storage/history_reader.h"
+#include "storage/history_replay.h"
 #include "storage/journal_codec.h"
 #include "storage/loader.h"
 #include "storage/migrate.h"
@@ -99,12 +102,15 @@ class MissionFile::Impl {
   absl::Status OpenWriter();
 
   absl::Status Commit(const Batch& batch);
-  absl::StatusOr<Loaded> Load() { return LoadMission(writer_); }
+  void LimitHistory(const HistoryLimits& limits);
+  absl::StatusOr<Loaded> Load();
   absl::Status CopyLog();
   absl::Status Close();
   absl::Status ReadContactHistory(
       const map::ContactKey& key, Time from, Time to,
       const std::function<bool(const ContactHistoryRow&)>& visit);
+  absl::StatusOr<std::vector<ContactHistoryRow>> ReadContactHistoryIn(
+      const HistoryArea& area, Time from, Time to, std::size_t max_rows);
   absl::StatusOr<SavedCopy> SaveCopy(const std::string& path);
   absl::StatusOr<Proof> Verify();
   MissionFileStatus Status() const;
@@ -125,7 +131,12 @@ class MissionFile::Impl {
   absl::StatusOr<Outcome> WriteBatch(const Batch& batch);
   absl::Status WriteJournal(const std::vector<JournalSegment>& segments);
   absl::Status WritePositions(const Positions& reached);
+  // What of the history waits goes into the file.
+  absl::Status FlushHistory();
   static absl::StatusOr<Connection> OpenReader(const std::string& path);
+  // Runs `read` on reader_ in one transaction.
+  absl::Status ReadAtOneMoment(
+      const std::function<absl::Status(Connection&)>& read);
 
   const std::string path_;
   // Held until all connections are closed: members die in reverse order.
@@ -135,6 +146,10 @@ class MissionFile::Impl {
   // The storage thread's.
   Connection writer_;
   std::optional<ContactTable> contacts_;
+  std::unique_ptr<ContactHistory> history_;
+  HistoryLimits limits_;
+  // A journal is there whose part of the history nobody made again yet.
+  bool must_load_ = false;
   Statement add_segment_;
   Statement set_position_;
   Positions positions_;
@@ -171,6 +186,8 @@ absl::Status MissionFile::Impl::OpenWriter() {
           {position.epoch, position.sequence});
   }
   FATHOM_ASSIGN_OR_RETURN(contacts_, ContactTable::Create(writer_));
+  FATHOM_ASSIGN_OR_RETURN(history_,
+                          ContactHistory::Create(writer_, *contacts_));
   FATHOM_ASSIGN_OR_RETURN(
       add_segment_,
       writer_.Prepare("INSERT INTO journal (first_revision, last_revision, "
@@ -188,7 +205,9 @@ absl::Status MissionFile::Impl::OpenWriter() {
   FATHOM_ASSIGN_OR_RETURN(
       const std::int64_t records,
       writer_.QueryInt("SELECT ifnull(sum(record_count), 0) FROM journal"));
+  must_load_ = records > 0;
   MutexLock lock(status_mutex_);
+  status_.history = history_->total();
   status_.checkpoint_revision = static_cast<std::uint64_t>(checkpoint);
   status_.durable_revision =
       static_cast<std::uint64_t>(std::max(checkpoint, last));
@@ -276,9 +295,9 @@ absl::StatusOr<MissionFile::Impl::Outcome> MissionFile::Impl::WriteBatch(
 
   FATHOM_ASSIGN_OR_RETURN(Transaction transaction, Transaction::Begin(writer_));
   FATHOM_RETURN_IF_ERROR(WriteJournal(segments));
-  for (const ContactHistoryRow& row : batch.contact_history) {
-    FATHOM_RETURN_IF_ERROR(contacts_->AppendHistory(row));
-  }
+  FATHOM_RETURN_IF_ERROR(history_->Write(
+      batch.contact_history,
+      batch.checkpoint.has_value() ? &*batch.checkpoint : nullptr, limits_));
   FATHOM_RETURN_IF_ERROR(WritePositions(outcome.reached));
   if (batch.checkpoint.has_value()) {
     FATHOM_RETURN_IF_ERROR(
@@ -303,10 +322,15 @@ absl::Status MissionFile::Impl::Commit(const Batch& batch) {
   if (closed_) return absl::FailedPreconditionError("the mission is closed");
   FATHOM_RETURN_IF_ERROR(failed_);
   if (batch.empty()) return absl::OkStatus();
+  if (must_load_) {
+    return absl::FailedPreconditionError(
+        "the mission has a journal: Load it before the first Commit");
+  }
   FATHOM_RETURN_IF_ERROR(CheckBatch(batch));
   absl::StatusOr<Outcome> outcome = WriteBatch(batch);
   if (!outcome.ok()) {
     contacts_->ForgetNumbers();
+    history_->RolledBack();
     // After an I/O error nobody knows what is on the disk: no later OK could
     // be believed (a second fsync may succeed without having written).
     if (absl::IsInternal(outcome.status())) failed_ = outcome.status();
@@ -315,8 +339,10 @@ absl::Status MissionFile::Impl::Commit(const Batch& batch) {
   for (auto& [key, sequence] : outcome->reached) {
     Raise(positions_, key.first, key.second, sequence);
   }
+  history_->Committed(batch.contact_history);
   {
     MutexLock lock(status_mutex_);
+    status_.history = history_->total();
     status_.durable_revision = outcome->durable_revision;
     status_.checkpoint_revision = outcome->checkpoint_revision;
     status_.journal_records = outcome->journal_records;
@@ -337,6 +363,23 @@ absl::Status MissionFile::Impl::Commit(const Batch& batch) {
   return absl::OkStatus();
 }
 
+void MissionFile::Impl::LimitHistory(const HistoryLimits& limits) {
+  limits_ = limits;
+  MutexLock lock(status_mutex_);
+  status_.history_limits = limits;
+}
+
+absl::StatusOr<Loaded> MissionFile::Impl::Load() {
+  FATHOM_ASSIGN_OR_RETURN(Loaded loaded, LoadMission(writer_));
+  if (must_load_) {
+    FATHOM_ASSIGN_OR_RETURN(const std::vector<ContactHistoryRow> rows,
+                            ReplayHistory(loaded));
+    FATHOM_RETURN_IF_ERROR(history_->Adopt(rows));
+    must_load_ = false;
+  }
+  return loaded;
+}
+
 absl::Status MissionFile::Impl::CopyLog() {
   if (closed_) return absl::FailedPreconditionError("the mission is closed");
   FATHOM_RETURN_IF_ERROR(failed_);
@@ -346,16 +389,25 @@ absl::Status MissionFile::Impl::CopyLog() {
   return status;
 }
 
+absl::Status MissionFile::Impl::FlushHistory() {
+  if (history_->Contacts().empty()) return absl::OkStatus();
+  FATHOM_ASSIGN_OR_RETURN(Transaction transaction, Transaction::Begin(writer_));
+  FATHOM_RETURN_IF_ERROR(history_->Flush());
+  return transaction.Commit();
+}
+
 absl::Status MissionFile::Impl::Close() {
   if (std::exchange(closed_, true)) return absl::OkStatus();
   {
     MutexLock lock(reader_mutex_);
     reader_ = Connection();
   }
+  absl::Status status = failed_;
+  if (history_ != nullptr && status.ok()) status = FlushHistory();
+  history_.reset();
   contacts_.reset();
   add_segment_ = Statement();
   set_position_ = Statement();
-  absl::Status status = failed_;
   if (writer_.is_open() && status.ok()) {
     status = writer_.CheckpointTruncate();
     if (status.ok()) writer_.CheckpointOnClose();
@@ -372,14 +424,43 @@ absl::StatusOr<Connection> MissionFile::Impl::OpenReader(
   return reader;
 }
 
-absl::Status MissionFile::Impl::ReadContactHistory(
-    const map::ContactKey& key, Time from, Time to,
-    const std::function<bool(const ContactHistoryRow&)>& visit) {
+absl::Status MissionFile::Impl::ReadAtOneMoment(
+    const std::function<absl::Status(Connection&)>& read) {
   MutexLock lock(reader_mutex_);
   if (!reader_.is_open()) {
     FATHOM_ASSIGN_OR_RETURN(reader_, OpenReader(path_));
   }
-  return ReadHistory(reader_, key, from, to, visit);
+  FATHOM_RETURN_IF_ERROR(reader_.Execute("BEGIN"));
+  absl::Status status = read(reader_);
+  const absl::Status ended = reader_.Execute("ROLLBACK");
+  if (status.ok()) status = ended;
+  return status;
+}
+
+absl::Status MissionFile::Impl::ReadContactHistory(
+    const map::ContactKey& key, Time from, Time to,
+    const std::function<bool(const ContactHistoryRow&)>& visit) {
+  // Before the file: what goes into it meanwhile is then seen twice, not
+  // missed.
+  const HistoryTail tail = history_->Tail(key);
+  return ReadAtOneMoment([&](Connection& reader) {
+    return ReadHistory(reader, key, tail, from, to, visit);
+  });
+}
+
+absl::StatusOr<std::vector<ContactHistoryRow>>
+MissionFile::Impl::ReadContactHistoryIn(const HistoryArea& area, Time from,
+                                        Time to, std::size_t max_rows) {
+  HistoryTails tails;
+  for (const map::ContactKey& key : history_->Contacts()) {
+    tails.emplace(key, history_->Tail(key));
+  }
+  absl::StatusOr<std::vector<ContactHistoryRow>> rows;
+  FATHOM_RETURN_IF_ERROR(ReadAtOneMoment([&](Connection& reader) {
+    rows = ReadHistoryIn(reader, area, tails, from, to, max_rows);
+    return rows.status();
+  }));
+  return rows;
 }
 
 absl::StatusOr<SavedCopy> MissionFile::Impl::SaveCopy(const std::string& path) {
@@ -469,6 +550,9 @@ absl::StatusOr<std::unique_ptr<MissionFile>> MissionFile::Open(
 absl::Status MissionFile::Commit(const Batch& batch) {
   return impl_->Commit(batch);
 }
+void MissionFile::LimitHistory(const HistoryLimits& limits) {
+  impl_->LimitHistory(limits);
+}
 absl::StatusOr<Loaded> MissionFile::Load() { return impl_->Load(); }
 absl::Status MissionFile::CopyLog() { return impl_->CopyLog(); }
 absl::Status MissionFile::Close() { return impl_->Close(); }
@@ -479,6 +563,11 @@ absl::Status MissionFile::ReadContactHistory(
   return impl_->ReadContactHistory(key, from, to, visit);
 }
 
+absl::StatusOr<std::vector<ContactHistoryRow>>
+MissionFile::ReadContactHistoryIn(const HistoryArea& area, Time from, Time to,
+                                  std::size_t max_rows) {
+  return impl_->ReadContactHistoryIn(area, from, to, max_rows);
+}
 absl::StatusOr<SavedCopy> MissionFile::SaveCopy(const std::string& path) {
   return impl_->SaveCopy(path);
 }

@@ -17,9 +17,9 @@
 // kWalCheckpointBytes and at idle, never inside Commit's fsync path
 // automatically. docs/storage_format.md describes the file to the byte.
 //
-// Thread safety: Commit, Load, CopyLog and Close belong to one thread at a
-// time (the storage thread); ReadContactHistory, Status, SaveCopy,
-// Verify and metadata may be called from any thread at any time.
+// Thread safety: LimitHistory, Commit, Load, CopyLog and Close belong to one
+// thread at a time (the storage thread); ReadContactHistory(In), Status,
+// SaveCopy, Verify and metadata may be called from any thread at any time.
 
 #ifndef FATHOM_STORAGE_MISSION_FILE_H_
 #define FATHOM_STORAGE_MISSION_FILE_H_
@@ -28,12 +28,14 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "base/time.h"
 #include "map/contacts/contact.h"
 #include "map/geodesy/ids.h"
+#include "storage/history_table.h"
 #include "storage/mission_records.h"
 #include "storage/verify.h"
 
@@ -44,7 +46,7 @@ inline constexpr std::int32_t kApplicationId = 0x4674686D;
 
 // The user_version that this program writes, and the oldest that it reads.
 // Older ones were never released.
-inline constexpr int kSchemaVersion = 6;
+inline constexpr int kSchemaVersion = 7;
 inline constexpr int kOldestSchemaVersion = 5;
 
 // Size of the write-ahead log beyond which Commit copies it into the file
@@ -70,6 +72,10 @@ struct MissionFileStatus {
   std::uint64_t checkpoint_revision = 0;
   // The log is beyond kWalKeepBytes: a reader keeps it from being copied.
   bool log_starved = false;
+  // Of the contact history: what is in blocks (the newest estimates, at most
+  // one block of each contact, come on top), and what the limits let go.
+  HistoryTotal history;
+  HistoryLimits history_limits;
 };
 
 // What SaveCopy wrote.
@@ -114,12 +120,17 @@ class MissionFile {
   // Errors: RESOURCE_EXHAUSTED (disk full: nothing was written, the same
   // batch may be committed later), INVALID_ARGUMENT (revisions not
   // ascending), FAILED_PRECONDITION (`previous` is not the view of the file's
-  // last checkpoint), INTERNAL (see promise 1), DATA_LOSS.
+  // last checkpoint; a journal that was not loaded), INTERNAL (see promise 1),
+  // DATA_LOSS.
   absl::Status Commit(const Batch& batch);
 
-  // Reads the whole mission. Before the first Commit. A blob whose checksum
-  // fails is DATA_LOSS naming the block, contact or segment; only a tile is
-  // left out and told in Loaded::damage (quarantine.h). Tiles are
+  // How much of the contact history is kept (all of it, until this is called).
+  void LimitHistory(const HistoryLimits& limits);
+
+  // Reads the whole mission. Before the first Commit to a file that has a
+  // journal, whose part of the contact history is made again here. A blob whose
+  // checksum fails is DATA_LOSS naming the block, contact or segment; only a
+  // tile is left out and told in Loaded::damage (quarantine.h). Tiles are
   // decoded on up to four threads, ended when it returns. Cost: about 30 ns
   // of processor time per leaf.
   absl::StatusOr<Loaded> Load();
@@ -139,6 +150,12 @@ class MissionFile {
   absl::Status ReadContactHistory(
       const map::ContactKey& key, Time from, Time to,
       const std::function<bool(const ContactHistoryRow&)>& visit);
+
+  // The estimates of all contacts with from <= time <= to whose position lies
+  // within `area`: by contact, oldest first. As above. Errors:
+  // RESOURCE_EXHAUSTED past `max_rows`; those of sqlite.h.
+  absl::StatusOr<std::vector<ContactHistoryRow>> ReadContactHistoryIn(
+      const HistoryArea& area, Time from, Time to, std::size_t max_rows);
 
   // Writes a consistent copy, as of the last commit, to `path` (which must
   // not exist) while work goes on: copied, fsynced, proved (verify.h), and

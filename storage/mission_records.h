@@ -121,6 +121,27 @@ struct ContactHistoryRow {
   bool revises = false;
 };
 
+// A part of the Earth between two parallels and two meridians, degrees, borders
+// included; west of `west_deg` > `east_deg` across the antimeridian.
+// Longitudes in [-180, 180].
+struct HistoryArea {
+  double south_deg = -90;
+  double north_deg = 90;
+  double west_deg = -180;
+  double east_deg = 180;
+
+  bool Holds(const map::GeodeticPoint& point) const;
+};
+
+// How much of the contact history is kept; what is older goes first. Judged at
+// each checkpoint, so that what a journal could make again is never in doubt.
+struct HistoryLimits {
+  // Beside the map's newest evidence.
+  std::optional<Duration> max_age;
+  // Of what is kept in blocks: about 100 bytes an estimate.
+  std::optional<std::uint64_t> max_bytes;
+};
+
 // A state of the map to be written whole.
 struct Checkpoint {
   // The map as of now->revision(): journal records up to it are then covered.

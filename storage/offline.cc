@@ -12,8 +12,10 @@
 
 #include "absl/strings/str_format.h"
 #include "base/status_macros.h"
-#include "storage/contact_codec.h"
+#include "storage/contact_table.h"
 #include "storage/file_lock.h"
+#include "storage/history_reader.h"
+#include "storage/history_replay.h"
 #include "storage/loader.h"
 #include "storage/mission_file.h"
 #include "storage/restore.h"
@@ -53,45 +55,64 @@ std::uint64_t SizeOf(const std::string& path) {
   return error ? 0 : size;
 }
 
-// Copies what can be decoded of the history.
-absl::Status CopyHistory(Connection& from, MissionFile& to, Repair& repair) {
+// What the journal adds to the history: nothing where the mission was closed
+// cleanly.
+absl::StatusOr<std::vector<ContactHistoryRow>> ReplayedHistory(
+    Connection& connection) {
+  FATHOM_ASSIGN_OR_RETURN(const std::int64_t segments,
+                          connection.QueryInt("SELECT count(*) FROM journal"));
+  if (segments == 0) return std::vector<ContactHistoryRow>();
+  FATHOM_ASSIGN_OR_RETURN(const Loaded loaded,
+                          LoadContactsAndJournal(connection));
+  return ReplayHistory(loaded);
+}
+
+// Counts contacts and rows of the history; of a damaged journal none.
+absl::Status CountHistory(Connection& connection, MissionInfo& info) {
+  const bool blocks = info.format_version >= kFirstBlockVersion;
   FATHOM_ASSIGN_OR_RETURN(
-      Statement select,
-      from.Prepare("SELECT source_id, contact_id, revision, contact_history."
-                   "content FROM contact_history JOIN contact USING "
-                   "(contact_number)"));
-  Batch batch;
-  while (true) {
-    const absl::StatusOr<bool> more = select.Step();
-    const bool lost = absl::IsDataLoss(more.status());
-    if (!more.ok() && !lost) return more.status();
-    if (lost) {
-      repair.left_out.push_back(
-          absl::StrFormat("contact history behind row %d: %s",
-                          repair.history_rows, more.status().message()));
-    }
-    const bool end = lost || !*more;
-    if (end || batch.contact_history.size() >= kHistoryRowsPerCommit) {
-      FATHOM_RETURN_IF_ERROR(to.Commit(batch));
-      batch = Batch();
-    }
-    if (end) return absl::OkStatus();
-    ContactHistoryRow row;
-    row.revision = select.ColumnUint(2);
-    absl::StatusOr<map::ContactEstimate> estimate = DecodeContactEstimate(
-        select.ColumnBlob(3),
-        absl::StrFormat("history of contact_id=%s", select.ColumnText(1)));
-    if (!estimate.ok()) {
-      if (!absl::IsDataLoss(estimate.status())) return estimate.status();
-      repair.left_out.push_back(std::string(estimate.status().message()));
-      continue;
-    }
-    row.estimate = *std::move(estimate);
-    row.estimate.key = {.source = {select.ColumnText(0)},
-                        .contact = {select.ColumnText(1)}};
-    batch.contact_history.push_back(std::move(row));
-    ++repair.history_rows;
+      const std::int64_t stored,
+      connection.QueryInt(
+          blocks ? "SELECT estimate_count FROM contact_history_total"
+                 : "SELECT count(*) FROM contact_history"));
+  info.history_rows = static_cast<std::uint64_t>(stored);
+  if (!blocks) return absl::OkStatus();
+  const auto replayed = ReplayedHistory(connection);
+  if (absl::IsDataLoss(replayed.status())) return absl::OkStatus();
+  FATHOM_RETURN_IF_ERROR(replayed.status());
+  FATHOM_ASSIGN_OR_RETURN(const HistoryTails tails,
+                          FindTails(connection, *replayed));
+  FATHOM_ASSIGN_OR_RETURN(ContactTable contacts,
+                          ContactTable::Create(connection));
+  for (const auto& [key, tail] : tails) {
+    info.history_rows += tail.rows.size();
+    FATHOM_ASSIGN_OR_RETURN(const auto number, contacts.FindNumber(key));
+    if (!number.has_value()) ++info.contacts;
   }
+  return absl::OkStatus();
+}
+
+// Copies what can be decoded of the history. Closing `to` writes what waits.
+absl::Status CopyHistory(Connection& from,
+                         const std::vector<ContactHistoryRow>& replayed,
+                         MissionFile& to, Repair& repair) {
+  Batch batch;
+  const auto take = [&](const ContactHistoryRow& row) -> absl::Status {
+    batch.contact_history.push_back(row);
+    ++repair.history_rows;
+    if (batch.contact_history.size() < kHistoryRowsPerCommit) {
+      return absl::OkStatus();
+    }
+    FATHOM_RETURN_IF_ERROR(to.Commit(batch));
+    batch = Batch();
+    return absl::OkStatus();
+  };
+  const auto leave_out = [&repair](const absl::Status& status) {
+    repair.left_out.push_back(std::string(status.message()));
+    return absl::OkStatus();
+  };
+  FATHOM_RETURN_IF_ERROR(ReadWholeHistory(from, replayed, take, leave_out));
+  return to.Commit(batch);
 }
 
 // Half a file is worse than none.
@@ -261,8 +282,7 @@ absl::StatusOr<MissionInfo> ReadInfo(const std::string& path) {
   FATHOM_RETURN_IF_ERROR(
       count(info.activities, "SELECT count(*) FROM activity"));
   FATHOM_RETURN_IF_ERROR(count(info.contacts, "SELECT count(*) FROM contact"));
-  FATHOM_RETURN_IF_ERROR(
-      count(info.history_rows, "SELECT count(*) FROM contact_history"));
+  FATHOM_RETURN_IF_ERROR(CountHistory(connection, info));
   FATHOM_RETURN_IF_ERROR(
       count(info.journal_records,
             "SELECT ifnull(sum(record_count), 0) FROM journal"));
@@ -277,7 +297,9 @@ absl::StatusOr<Proof> ProveFile(const std::string& path) {
 absl::StatusOr<ExportedContacts> ExportFile(const std::string& path,
                                             const std::string& out) {
   FATHOM_ASSIGN_OR_RETURN(ReadMission mission, OpenToRead(path));
-  return ExportContacts(mission.connection, out);
+  FATHOM_ASSIGN_OR_RETURN(const std::vector<ContactHistoryRow> replayed,
+                          ReplayedHistory(mission.connection));
+  return ExportContacts(mission.connection, replayed, out);
 }
 
 absl::StatusOr<Repair> RepairMission(const std::string& path,
@@ -289,6 +311,8 @@ absl::StatusOr<Repair> RepairMission(const std::string& path,
   Repair repair;
   repair.left_out = loaded.damage;
   const MissionMetadata metadata = loaded.metadata;
+  FATHOM_ASSIGN_OR_RETURN(const std::vector<ContactHistoryRow> replayed,
+                          ReplayHistory(loaded));
   Batch batch;
   batch.source_positions = loaded.source_positions;
   FATHOM_ASSIGN_OR_RETURN(const RestoredMap restored,
@@ -301,7 +325,9 @@ absl::StatusOr<Repair> RepairMission(const std::string& path,
   FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<MissionFile> file,
                           MissionFile::Create(out, metadata));
   absl::Status status = file->Commit(batch);
-  if (status.ok()) status = CopyHistory(mission.connection, *file, repair);
+  if (status.ok()) {
+    status = CopyHistory(mission.connection, replayed, *file, repair);
+  }
   const absl::Status closed = file->Close();
   if (status.ok()) status = closed;
   if (status.ok()) return repair;

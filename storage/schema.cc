@@ -72,20 +72,6 @@ CREATE TABLE contact (
   UNIQUE (source_id, contact_id)
 ) STRICT;
 
-CREATE TABLE contact_history (
-  contact_number INTEGER NOT NULL REFERENCES contact,
-  time_us INTEGER NOT NULL,
-  revision INTEGER NOT NULL,
-  contact_class INTEGER NOT NULL,
-  status INTEGER NOT NULL,
-  latitude_deg REAL NOT NULL,
-  longitude_deg REAL NOT NULL,
-  velocity_north_m_s REAL NOT NULL,
-  velocity_east_m_s REAL NOT NULL,
-  content BLOB NOT NULL,
-  PRIMARY KEY (contact_number, time_us, revision)
-) STRICT, WITHOUT ROWID;
-
 CREATE TABLE source_position (
   stream INTEGER NOT NULL CHECK (stream IN (1, 2, 3)),
   source_id TEXT NOT NULL,
@@ -101,6 +87,35 @@ CREATE TABLE journal (
   record_count INTEGER NOT NULL,
   content BLOB NOT NULL
 ) STRICT;
+)sql";
+
+constexpr char kHistoryTables[] = R"sql(
+CREATE TABLE contact_history (
+  block_id INTEGER PRIMARY KEY,
+  contact_number INTEGER NOT NULL REFERENCES contact,
+  first_time_us INTEGER NOT NULL,
+  last_time_us INTEGER NOT NULL,
+  last_revision INTEGER NOT NULL,
+  estimate_count INTEGER NOT NULL,
+  content BLOB NOT NULL
+) STRICT;
+
+CREATE INDEX contact_history_time ON contact_history
+  (contact_number, last_time_us, first_time_us, last_revision);
+
+CREATE INDEX contact_history_age ON contact_history (last_time_us);
+
+CREATE VIRTUAL TABLE contact_history_place USING rtree (
+  block_id, south_deg, north_deg, west_deg, east_deg, first_s, last_s);
+
+CREATE TABLE contact_history_total (
+  only_row INTEGER PRIMARY KEY CHECK (only_row = 1),
+  estimate_count INTEGER NOT NULL,
+  content_bytes INTEGER NOT NULL,
+  forgotten_count INTEGER NOT NULL
+) STRICT;
+
+INSERT INTO contact_history_total VALUES (1, 0, 0, 0);
 )sql";
 
 constexpr char kMissionColumns[] =
@@ -228,6 +243,10 @@ absl::StatusOr<MissionMetadata> NormalMetadata(MissionMetadata metadata) {
   return metadata;
 }
 
+absl::Status CreateHistoryTables(Connection& connection) {
+  return connection.Execute(kHistoryTables);
+}
+
 absl::Status CreateSchema(Connection& connection,
                           const MissionMetadata& metadata) {
   // Before the first page is written: both are fixed with it. 8 KiB pages: see
@@ -243,6 +262,7 @@ absl::Status CreateSchema(Connection& connection,
   FATHOM_RETURN_IF_ERROR(connection.Execute(
       absl::StrFormat("PRAGMA user_version = %d", kSchemaVersion)));
   FATHOM_RETURN_IF_ERROR(connection.Execute(kTables));
+  FATHOM_RETURN_IF_ERROR(CreateHistoryTables(connection));
   FATHOM_ASSIGN_OR_RETURN(
       Statement insert,
       connection.Prepare(absl::StrFormat(

@@ -35,6 +35,10 @@ absl::StatusOr<MissionMetadata> NormalMetadata(MissionMetadata metadata);
 absl::Status CreateSchema(Connection& connection,
                           const MissionMetadata& metadata);
 
+// The tables of the contact history, empty (history_table.h): for a new mission
+// and for one of an older format.
+absl::Status CreateHistoryTables(Connection& connection);
+
 absl::StatusOr<MissionMetadata> ReadMetadata(Connection& connection);
 
 }  // namespace fathom::storage

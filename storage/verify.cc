@@ -2,10 +2,14 @@
 
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_format.h"
 #include "base/status_macros.h"
-#include "storage/contact_codec.h"
+#include "storage/history_codec.h"
+#include "storage/history_reader.h"
+#include "storage/history_replay.h"
+#include "storage/history_table.h"
 #include "storage/loader.h"
 #include "storage/restore.h"
 
@@ -59,6 +63,7 @@ class Prover {
   absl::Status CheckMap() {
     FATHOM_ASSIGN_OR_RETURN(Loaded loaded, LoadMission(connection_));
     for (const std::string& damage : loaded.damage) Tell(damage);
+    FATHOM_ASSIGN_OR_RETURN(replayed_, ReplayHistory(loaded));
     proof_.revision = loaded.revision;
     proof_.tiles = loaded.tiles.size();
     proof_.journal_records = loaded.journal.size();
@@ -75,30 +80,67 @@ class Prover {
   }
 
   absl::Status CheckHistory() {
+    FATHOM_RETURN_IF_ERROR(ReadWholeHistory(
+        connection_, replayed_,
+        [this](const ContactHistoryRow&) {
+          ++proof_.history_rows;
+          return absl::OkStatus();
+        },
+        [this](const absl::Status& damage) { return Note(damage); }));
+    FATHOM_ASSIGN_OR_RETURN(const std::int64_t version,
+                            connection_.QueryInt("PRAGMA user_version"));
+    return version < kFirstBlockVersion ? absl::OkStatus() : CheckBlocks();
+  }
+
+  // What the tables say of each block, and their own structure.
+  absl::Status CheckBlocks() {
+    FATHOM_ASSIGN_OR_RETURN(
+        const std::string index,
+        connection_.QueryText("SELECT rtreecheck('contact_history_place')"));
+    if (index != "ok") Tell("contact_history_place: " + index);
     FATHOM_ASSIGN_OR_RETURN(
         Statement select,
         connection_.Prepare(
-            "SELECT contact_number, time_us, content, contact_number IN "
+            "SELECT block_id, contact_number, first_time_us, last_time_us, "
+            "last_revision, estimate_count, content, contact_number IN "
             "(SELECT contact_number FROM contact) FROM contact_history"));
+    FATHOM_ASSIGN_OR_RETURN(HistoryTable table,
+                            HistoryTable::Create(connection_));
+    HistoryTotal total = {.forgotten_estimates =
+                              table.total().forgotten_estimates};
     while (true) {
       FATHOM_ASSIGN_OR_RETURN(const bool more, select.Step());
-      if (!more) return absl::OkStatus();
-      ++proof_.history_rows;
+      if (!more) break;
       const std::string what =
-          absl::StrFormat("contact_history contact_number=%d time_us=%d",
+          absl::StrFormat("contact_history block_id=%d contact_number=%d",
                           select.ColumnInt(0), select.ColumnInt(1));
-      const absl::StatusOr<map::ContactEstimate> point =
-          DecodeContactEstimate(select.ColumnBlob(2), what);
-      if (!point.ok()) {
-        FATHOM_RETURN_IF_ERROR(Note(point.status()));
-      } else if (ToUnixMicros(point->time) != select.ColumnInt(1)) {
-        Tell(what + ": holds another time");
+      total.estimates += select.ColumnUint(5);
+      total.bytes += select.ColumnBlob(6).size();
+      if (select.ColumnInt(7) == 0) Tell(what + ": its contact is missing");
+      const auto rows =
+          DecodeHistory(select.ColumnBlob(6), select.ColumnInt(1), what);
+      if (!rows.ok()) {
+        FATHOM_RETURN_IF_ERROR(Note(rows.status()));
+        continue;
       }
-      if (select.ColumnInt(3) == 0) Tell(what + ": its contact is missing");
+      const HistoryBlockMark said = {
+          .first = TimeFromUnixMicros(select.ColumnInt(2)),
+          .last = TimeFromUnixMicros(select.ColumnInt(3)),
+          .last_revision = select.ColumnUint(4),
+          .estimates = select.ColumnUint(5)};
+      if (MarkOf(*rows) != said) Tell(what + ": its row says otherwise");
+      FATHOM_ASSIGN_OR_RETURN(const bool placed,
+                              table.IsPlaced(select.ColumnInt(0), *rows));
+      if (!placed) Tell(what + ": is not where the index says");
     }
+    if (total != table.total()) {
+      Tell("contact_history_total: the blocks hold another number");
+    }
+    return absl::OkStatus();
   }
 
   Connection& connection_;
+  std::vector<ContactHistoryRow> replayed_;
   Proof proof_;
 };
 

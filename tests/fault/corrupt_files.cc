@@ -68,6 +68,7 @@ struct Sound {
         if (!(*mission)->Close().ok()) std::abort();
         mission->reset();
         mission = MissionFile::Open(path);
+        if (!(*mission)->Load().ok()) std::abort();
       }
     }
     file = ReadAll(path);

@@ -121,6 +121,7 @@ Workload RunWorkload(std::uint64_t seed, int commits) {
       file->reset();
       file = MissionFile::Open(path);
       Require(file.status());
+      Require((*file)->Load().status());
     }
   }
   disk.StopLog();

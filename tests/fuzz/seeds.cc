@@ -8,10 +8,12 @@
 #include <fstream>
 #include <random>
 #include <string>
+#include <vector>
 
 #include "storage/activity_codec.h"
 #include "storage/blob.h"
 #include "storage/contact_codec.h"
+#include "storage/history_codec.h"
 #include "storage/journal_codec.h"
 #include "storage/restore.h"
 #include "storage/tile_codec.h"
@@ -83,13 +85,17 @@ void WriteStorageSeeds(Seeds& seeds) {
         seeds.WriteBlob("tiles", "block-" + std::to_string(blocks++), 1,
                         storage::EncodeBlock(key, block));
       });
-  map::ContactEstimate estimate;
-  static_cast<map::ContactPoint&>(estimate) = storage::SampleContactPoint(1);
-  seeds.WriteBlob("contacts", "point", 0,
-                  storage::EncodeContactEstimate(estimate));
-  estimate.linked = {{.source = {"ais"}, .contact = {"235000001"}}};
-  seeds.WriteBlob("contacts", "linked-point", 4,
-                  storage::EncodeContactEstimate(estimate));
+  // Seeds of the rows of formats 5 and 6 were written by their programs.
+  const std::vector<map::ContactKey> names = {
+      {.source = {"ais"}, .contact = {"235000001"}}};
+  std::vector<storage::ContactHistoryRow> rows(3);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    static_cast<map::ContactPoint&>(rows[i].estimate) =
+        storage::SampleContactPoint(static_cast<int>(i));
+    rows[i].revision = i;
+  }
+  rows[1].estimate.linked = rows[2].estimate.linked = names;
+  seeds.WriteBlob("contacts", "history", 6, storage::EncodeHistory(1, rows));
   map::DiffContacts(
       map::ContactsView(), view->contacts(),
       [&](const map::Contact& contact) {
@@ -98,7 +104,7 @@ void WriteStorageSeeds(Seeds& seeds) {
         seeds.WriteBlob("contacts", "contact", 2, blob);
         seeds.WriteBlob("contacts", "contact-v1", 1, blob);
         map::StoredContact linked = contact.ToStored();
-        linked.links = map::ContactLinks{.since = {}, .names = estimate.linked};
+        linked.links = map::ContactLinks{.since = {}, .names = names};
         seeds.WriteBlob("contacts", "linked-contact", 5,
                         storage::EncodeContact(linked));
       },

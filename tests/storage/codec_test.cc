@@ -192,10 +192,9 @@ TEST(BlockKey, PacksAndUnpacks) {
 }
 
 TEST(ContactCodec, PointHasTheStatedSize) {
-  map::ContactEstimate estimate;
-  static_cast<map::ContactPoint&>(estimate) = SampleContactPoint(1);
-  EXPECT_EQ(EncodeContactEstimate(estimate).size(),
-            kBlobHeaderBytes + kContactPointBytes);
+  ByteWriter writer;
+  PutContactPoint(SampleContactPoint(1), writer);
+  EXPECT_EQ(writer.size(), kContactPointBytes);
 }
 
 TEST(ContactCodec, ContactComesBackBitForBit) {
@@ -229,19 +228,6 @@ TEST(ContactCodec, LinkedNamesComeBackAndTakeAVersionOfTheirOwn) {
   const std::vector<map::ContactKey> names = {
       {.source = {"ais"}, .contact = {"235000001"}},
       {.source = {"sonar"}, .contact = {"S:1"}}};
-  map::ContactEstimate estimate;
-  static_cast<map::ContactPoint&>(estimate) = SampleContactPoint(1);
-  EXPECT_EQ(EncodeContactEstimate(estimate)[1], 1);
-  estimate.linked = names;
-  const Bytes blob = EncodeContactEstimate(estimate);
-  EXPECT_EQ(blob[1], 2);
-  FATHOM_ASSERT_OK_AND_ASSIGN(const map::ContactEstimate told,
-                              DecodeContactEstimate(blob, "e"));
-  EXPECT_EQ(told, estimate);
-  ExpectNoCrash(blob, BlobKind::kContactEstimate, [](ByteSpan bytes) {
-    DecodeContactEstimate(bytes, "e").IgnoreError();
-  });
-
   map::StoredContact contact;
   contact.key = {.source = {"c4i"}, .contact = {"T9"}};
   contact.estimates.resize(1);

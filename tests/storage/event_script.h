@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "absl/strings/str_format.h"
+#include "storage/history_replay.h"
 #include "storage/restore.h"
 #include "tests/storage/sample_records.h"
 
@@ -82,11 +83,9 @@ class EventScript {
                          .sequence = i,
                          .report = SampleReport(static_cast<int>(i),
                                                 i % 2 == 0 ? "even" : "odd")};
-    const map::ContactOutcome outcome = map_.ApplyContact(record.report);
+    map::ContactOutcome outcome = map_.ApplyContact(record.report);
     Require(outcome.applied);
-    batch_.contact_history.push_back({.revision = i,
-                                      .estimate = outcome.estimate.value(),
-                                      .revises = false});
+    AppendHistoryRows(std::move(outcome), i, batch_.contact_history);
     batch_.journal.push_back({i, std::move(record)});
   }
 

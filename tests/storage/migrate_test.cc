@@ -12,6 +12,7 @@
 
 #include "storage/checked_pages.h"
 #include "storage/mission_file.h"
+#include "storage/offline.h"
 #include "storage/restore.h"
 #include "tests/storage/temp_dir.h"
 #include "tests/testing/status_matchers.h"
@@ -64,14 +65,44 @@ TEST(Migrate, MissionOfVersion5IsBackedUpAndBroughtToThisOne) {
   EXPECT_EQ(ReadAll(path + ".v5.bak")[63], 5);
 }
 
-TEST(Migrate, MissionOfVersion6OpensAsItIs) {
+// Its history is in rows, ours in blocks.
+TEST(Migrate, MissionOfVersion6IsBackedUpAndBroughtToThisOne) {
   const TempDir dir;
   const std::string path = dir.File("m");
   std::filesystem::copy_file(
       FATHOM_SOURCE_DIR "/tests/golden/mission-v6.fathom", path);
-  FATHOM_ASSERT_OK_AND_ASSIGN(const auto file, MissionFile::Open(path));
-  ExpectGolden(*file);
-  EXPECT_FALSE(std::filesystem::exists(path + ".v6.bak"));
+  // The verbs that only read do not ask for that.
+  FATHOM_ASSERT_OK_AND_ASSIGN(const Proof as_it_was, ProveFile(path));
+  EXPECT_THAT(as_it_was.problems, IsEmpty());
+  EXPECT_EQ(as_it_was.history_rows, 21u);
+  FATHOM_ASSERT_OK_AND_ASSIGN(const ExportedContacts exported,
+                              ExportFile(path, dir.File("before.gpkg")));
+  EXPECT_EQ(exported.points, 21u);
+  FATHOM_ASSERT_OK_AND_ASSIGN(const Repair repaired,
+                              RepairMission(path, dir.File("repaired")));
+  EXPECT_THAT(repaired.left_out, IsEmpty());
+  EXPECT_EQ(repaired.history_rows, 21u);
+  EXPECT_EQ(ReadAll(path)[63], 6);
+  for (int time = 0; time < 2; ++time) {
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto file, MissionFile::Open(path));
+    ExpectGolden(*file);
+    ASSERT_THAT(file->Close(), IsOk());
+  }
+  EXPECT_EQ(ReadAll(path)[63], kSchemaVersion);
+  EXPECT_EQ(ReadAll(path + ".v6.bak")[63], 6);
+}
+
+// One copied while it was served, with a journal; one closed, with none.
+TEST(Migrate, MissionOfVersion7OpensAsItIs) {
+  for (const char* name : {"mission-v7.fathom", "mission-v7-closed.fathom"}) {
+    const TempDir dir;
+    const std::string path = dir.File("m");
+    std::filesystem::copy_file(
+        std::string(FATHOM_SOURCE_DIR "/tests/golden/") + name, path);
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto file, MissionFile::Open(path));
+    ExpectGolden(*file);
+    EXPECT_FALSE(std::filesystem::exists(path + ".v7.bak"));
+  }
 }
 
 }  // namespace

@@ -1,0 +1,135 @@
+// The tables `contact_history`, its index by place and time, and
+// `contact_history_total`: blocks of what was believed of each contact.
+// docs/storage_format.md says why blocks, and what each column means.
+//
+// A contact's blocks follow one another: no row of one lies between two of
+// another. One thread at a time; inside the caller's transaction.
+
+#ifndef FATHOM_STORAGE_HISTORY_TABLE_H_
+#define FATHOM_STORAGE_HISTORY_TABLE_H_
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "base/time.h"
+#include "storage/history_tail.h"
+#include "storage/mission_records.h"
+#include "storage/sqlite.h"
+
+namespace fathom::storage {
+
+// What the blocks hold, and what was let go (HistoryLimits).
+struct HistoryTotal {
+  std::uint64_t estimates = 0;
+  // Of the blocks' contents.
+  std::uint64_t bytes = 0;
+  std::uint64_t forgotten_estimates = 0;
+
+  friend bool operator==(const HistoryTotal&, const HistoryTotal&) = default;
+};
+
+// What a block's row says of it.
+struct HistoryBlockMark {
+  Time first;
+  Time last;
+  std::uint64_t last_revision = 0;
+  std::uint64_t estimates = 0;
+
+  friend bool operator==(const HistoryBlockMark&,
+                         const HistoryBlockMark&) = default;
+};
+// REQUIRES: rows, in order.
+HistoryBlockMark MarkOf(std::span<const ContactHistoryRow> rows);
+
+// Blocks forgotten in one transaction, at most: a checkpoint stays short. The
+// next one goes on.
+inline constexpr int kMaxForgottenBlocks = 1000;
+
+class HistoryTable {
+ public:
+  // `connection` must outlive it.
+  static absl::StatusOr<HistoryTable> Create(Connection& connection);
+
+  // Puts the tail into blocks: what it cut goes, and a last block that is less
+  // than half full is filled up. O(rows) and one insert for kBlockEstimates.
+  absl::Status Write(std::int64_t contact_number, const HistoryTail& tail);
+
+  // Deletes blocks, the one that ended first first, that the limits do not
+  // allow: all older than max_age beside `now`, then as long as there are more
+  // than max_bytes. At most kMaxForgottenBlocks.
+  absl::Status Forget(const HistoryLimits& limits, Time now);
+
+  // The newest revision in the contact's blocks; 0: there are none.
+  absl::StatusOr<std::uint64_t> NewestRevision(std::int64_t contact_number);
+
+  // Whether the index by place and time finds the block with these rows.
+  absl::StatusOr<bool> IsPlaced(std::int64_t block_id,
+                                std::span<const ContactHistoryRow> rows);
+
+  const HistoryTotal& total() const { return total_; }
+  // As it stands in the file: after a transaction that was rolled back.
+  absl::Status ReloadTotal();
+
+ private:
+  struct Block {
+    std::int64_t id = 0;
+    std::uint64_t estimates = 0;
+    std::uint64_t bytes = 0;
+  };
+  absl::StatusOr<std::vector<Block>> FindJoined(std::int64_t contact_number,
+                                                const HistoryTail& tail);
+  absl::Status Insert(std::int64_t contact_number,
+                      std::span<const ContactHistoryRow> rows);
+  absl::Status Delete(const Block& block);
+  absl::Status WriteTotal();
+
+  HistoryTotal total_;
+  Statement newest_blocks_;
+  Statement newest_revision_;
+  Statement read_;
+  Statement insert_;
+  Statement insert_place_;
+  Statement delete_;
+  Statement delete_place_;
+  Statement oldest_;
+  Statement place_;
+  Statement write_total_;
+  Statement read_total_;
+};
+
+// Some of a contact's blocks, in order.
+struct HistoryBlocks {
+  std::int64_t contact_number = 0;
+  map::ContactKey key;
+  std::vector<std::int64_t> block_ids;
+};
+
+// The blocks of one contact, `key`, that reach into the time from `from` to
+// `to`; nullopt: the file does not know it. Errors: those of sqlite.h.
+absl::StatusOr<std::optional<HistoryBlocks>> FindBlocks(
+    Connection& connection, const map::ContactKey& key, Time from, Time to);
+
+// The same of all contacts, in order of key, of blocks that may hold something
+// within the area. O(log blocks + blocks found).
+absl::StatusOr<std::vector<HistoryBlocks>> FindBlocksIn(Connection& connection,
+                                                        const HistoryArea& area,
+                                                        Time from, Time to);
+
+// Calls `visit` for the rows with from <= time <= to that the blocks hold or
+// `tail`, the same contact's, adds, in order, until it returns false; whether
+// it never did. REQUIRES: one transaction with what found the blocks.
+// Errors: DATA_LOSS; those of sqlite.h.
+absl::StatusOr<bool> ReadBlocks(
+    Connection& connection, const HistoryBlocks& blocks,
+    const HistoryTail& tail, Time from, Time to,
+    const std::function<bool(const ContactHistoryRow&)>& visit);
+
+}  // namespace fathom::storage
+
+#endif  // FATHOM_STORAGE_HISTORY_TABLE_H_

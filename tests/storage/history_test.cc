@@ -1,0 +1,405 @@
+// The contact history in blocks: codec, tails, and the file against a list
+// that is kept plainly.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "storage/history_codec.h"
+#include "storage/history_replay.h"
+#include "storage/history_tail.h"
+#include "storage/mission_file.h"
+#include "storage/offline.h"
+#include "storage/restore.h"
+#include "tests/storage/sample_records.h"
+#include "tests/storage/temp_dir.h"
+#include "tests/testing/status_matchers.h"
+
+namespace fathom::storage {
+namespace {
+
+using ::fathom::testing::IsOk;
+using ::fathom::testing::StatusIs;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+Time At(int s) {
+  return TimeFromUnixMicros(1'000'000'000'000'000 + s * 1'000'000ll);
+}
+
+ContactHistoryRow Row(int s, std::uint64_t revision, bool revises = false) {
+  ContactHistoryRow row{
+      .revision = revision, .estimate = {}, .revises = revises};
+  static_cast<map::ContactPoint&>(row.estimate) = SampleContactPoint(1);
+  row.estimate.time = At(s);
+  return row;
+}
+
+std::vector<std::pair<int, int>> TimesAndRevisions(
+    const std::vector<ContactHistoryRow>& rows) {
+  std::vector<std::pair<int, int>> found;
+  for (const ContactHistoryRow& row : rows) {
+    found.emplace_back(
+        static_cast<int>((row.estimate.time - At(0)).count() / 1'000'000),
+        static_cast<int>(row.revision));
+  }
+  return found;
+}
+
+TEST(HistoryCodec, BlockComesBackBitForBitWithTheNamesOfItsTime) {
+  const std::vector<map::ContactKey> names = {
+      {.source = {"ais"}, .contact = {"235000001"}}};
+  std::vector<ContactHistoryRow> rows;
+  for (int i = 0; i < static_cast<int>(kMaxBlockEstimates); ++i) {
+    rows.push_back(Row(i / 2, static_cast<std::uint64_t>(i)));
+    // None, a name, none, and the name again at the end.
+    if ((i >= 10 && i < 20) || i == 255) rows.back().estimate.linked = names;
+  }
+  const Bytes blob = EncodeHistory(7, rows);
+  FATHOM_ASSERT_OK_AND_ASSIGN(const std::vector<ContactHistoryRow> back,
+                              DecodeHistory(blob, 7, "block"));
+  ASSERT_EQ(back.size(), rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    EXPECT_EQ(back[i].revision, rows[i].revision);
+    EXPECT_EQ(back[i].estimate, rows[i].estimate) << i;
+  }
+  EXPECT_THAT(DecodeHistory(blob, 8, "block"),
+              StatusIs(absl::StatusCode::kDataLoss,
+                       HasSubstr("holds contact_number=7")));
+}
+
+TEST(HistoryCodec, WhatNoEncoderWroteIsRefused) {
+  std::vector<ContactHistoryRow> rows = {Row(1, 1), Row(2, 2)};
+  std::swap(rows[0], rows[1]);
+  EXPECT_THAT(DecodeHistory(EncodeHistory(7, rows), 7, "block"),
+              StatusIs(absl::StatusCode::kDataLoss));
+  const Bytes blob = EncodeHistory(7, std::vector{Row(1, 1)});
+  for (std::size_t size = 0; size < blob.size(); ++size) {
+    EXPECT_THAT(DecodeHistory(ByteSpan(blob).first(size), 7, "block"),
+                StatusIs(absl::StatusCode::kDataLoss))
+        << size;
+  }
+}
+
+TEST(HistoryTail, RevisedRowsTakeThePlaceOfOnesOfBefore) {
+  HistoryTail tail;
+  for (const auto& row : {Row(10, 1), Row(20, 2), Row(30, 3)}) tail.Add(row);
+  EXPECT_FALSE(tail.cut.has_value());
+  // The report of 15 s came as revision 4.
+  for (const auto& row : {Row(10, 4, true), Row(15, 4), Row(20, 4)}) {
+    tail.Add(row);
+  }
+  EXPECT_THAT(
+      TimesAndRevisions(tail.rows),
+      ElementsAre(std::pair(10, 4), std::pair(15, 4), std::pair(20, 4)));
+  EXPECT_TRUE(tail.Stands(Row(9, 1)));
+  EXPECT_FALSE(tail.Stands(Row(10, 1)));
+}
+
+TEST(HistoryTail, RowsAreInOrderAndOfOneTimeAndRevisionTheLastStays) {
+  HistoryTail tail;
+  for (const auto& row : {Row(20, 2), Row(10, 3), Row(20, 1)}) tail.Add(row);
+  ContactHistoryRow last = Row(10, 3);
+  last.estimate.radius_m = 77;
+  tail.Add(last);
+  EXPECT_THAT(
+      TimesAndRevisions(tail.rows),
+      ElementsAre(std::pair(10, 3), std::pair(20, 1), std::pair(20, 2)));
+  EXPECT_EQ(tail.rows[0].estimate.radius_m, 77);
+}
+
+// A mission, its map, and what its history must be.
+class HistoryFileTest : public ::testing::Test {
+ protected:
+  using Kept = std::map<std::pair<Time, std::uint64_t>, map::ContactEstimate>;
+
+  HistoryFileTest() {
+    file_ = *MissionFile::Create(path(), SampleMetadata());
+    map_ = std::make_unique<map::ObstacleMap>(*OptionsOf(SampleMetadata()));
+    saved_ = map_->View();
+  }
+
+  std::string path() const { return dir_.File("m"); }
+
+  void Report(const map::ContactReport& report) {
+    map::ContactOutcome outcome = map_->ApplyContact(report);
+    const std::size_t before = batch_.contact_history.size();
+    AppendHistoryRows(std::move(outcome), map_->revision(),
+                      batch_.contact_history);
+    batch_.journal.push_back(
+        {map_->revision(),
+         ContactRecord{
+             .epoch = 1, .sequence = map_->revision(), .report = report}});
+    for (std::size_t i = before; i < batch_.contact_history.size(); ++i) {
+      Keep(batch_.contact_history[i]);
+    }
+  }
+
+  void Keep(const ContactHistoryRow& row) {
+    Kept& kept = kept_[row.estimate.key];
+    if (row.revises) {
+      std::erase_if(kept, [&row](const auto& held) {
+        return held.first.first >= row.estimate.time &&
+               held.first.second < row.revision;
+      });
+    }
+    kept[{row.estimate.time, row.revision}] = row.estimate;
+  }
+
+  void Commit(bool checkpoint) {
+    if (checkpoint) {
+      batch_.checkpoint = Checkpoint{.now = map_->View(), .previous = saved_};
+      saved_ = batch_.checkpoint->now;
+    }
+    ASSERT_THAT(file_->Commit(batch_), IsOk());
+    batch_ = Batch();
+  }
+
+  // Of all of them, in each way of asking.
+  void ExpectKept(MissionFile& file) {
+    std::vector<map::ContactEstimate> all;
+    for (const auto& [key, kept] : kept_) {
+      std::vector<map::ContactEstimate> expected;
+      for (const auto& [place, estimate] : kept) expected.push_back(estimate);
+      std::vector<map::ContactEstimate> found;
+      ASSERT_THAT(file.ReadContactHistory(key, Time::min(), Time::max(),
+                                          [&](const ContactHistoryRow& row) {
+                                            found.push_back(row.estimate);
+                                            return true;
+                                          }),
+                  IsOk());
+      ASSERT_EQ(found.size(), expected.size()) << key.contact.value;
+      ASSERT_EQ(found, expected) << key.contact.value;
+      all.insert(all.end(), expected.begin(), expected.end());
+    }
+    FATHOM_ASSERT_OK_AND_ASSIGN(
+        const std::vector<ContactHistoryRow> everywhere,
+        file.ReadContactHistoryIn({}, Time::min(), Time::max(), all.size()));
+    ASSERT_EQ(everywhere.size(), all.size());
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      ASSERT_EQ(everywhere[i].estimate, all[i]) << i;
+    }
+  }
+
+  const TempDir dir_;
+  std::unique_ptr<MissionFile> file_;
+  std::unique_ptr<map::ObstacleMap> map_;
+  std::shared_ptr<const map::ObstacleMapView> saved_;
+  Batch batch_;
+  std::map<map::ContactKey, Kept> kept_;
+};
+
+// Reports in order and late ones, small and large commits, checkpoints: the
+// file says what a plain list says, now, after a crash, after a clean end.
+TEST_F(HistoryFileTest, IsWhatAPlainListSaysWhateverHappens) {
+  std::mt19937 random(4);
+  std::uniform_int_distribution<int> percent(0, 99);
+  std::uniform_int_distribution<int> late_s(1, 70);
+  int crashes = 0;
+  for (int i = 0; i < 3000; ++i) {
+    // The first of four reports most often: blocks of its own.
+    const int who = percent(random) < 70 ? 0 : i % 4;
+    map::ContactReport report = SampleReport(i, "c" + std::to_string(who));
+    if (percent(random) < 10) {
+      report.time -= std::chrono::seconds(late_s(random));
+      std::get<map::ContactFix>(report.observation).position.longitude_deg +=
+          1e-4;
+    }
+    Report(report);
+    if (percent(random) < 20) Commit(percent(random) < 3);
+    if (i % 500 == 499) {
+      Commit(false);
+      ExpectKept(*file_);
+      // As a power cut leaves it.
+      const std::string cut = dir_.File("cut" + std::to_string(crashes++));
+      for (const char* end : {"", "-wal"}) {
+        std::filesystem::copy_file(path() + end, cut + end);
+      }
+      {
+        FATHOM_ASSERT_OK_AND_ASSIGN(const Proof proof, ProveFile(cut));
+        EXPECT_THAT(proof.problems, IsEmpty());
+        std::size_t rows = 0;
+        for (const auto& [key, kept] : kept_) rows += kept.size();
+        EXPECT_EQ(proof.history_rows, rows);
+      }
+      FATHOM_ASSERT_OK_AND_ASSIGN(const auto again, MissionFile::Open(cut));
+      ASSERT_THAT(again->Load(), IsOk());
+      ExpectKept(*again);
+    }
+  }
+  EXPECT_GT(file_->Status().history.estimates, 10 * kBlockEstimates);
+  ASSERT_THAT(file_->Close(), IsOk());
+  file_.reset();
+  FATHOM_ASSERT_OK_AND_ASSIGN(file_, MissionFile::Open(path()));
+  ASSERT_THAT(file_->Load(), IsOk());
+  ExpectKept(*file_);
+  ASSERT_THAT(file_->Close(), IsOk());
+  file_.reset();
+  FATHOM_ASSERT_OK_AND_ASSIGN(const ExportedContacts exported,
+                              ExportFile(path(), dir_.File("tracks.gpkg")));
+  std::size_t rows = 0;
+  for (const auto& [key, kept] : kept_) rows += kept.size();
+  EXPECT_EQ(exported.points, rows);
+  FATHOM_ASSERT_OK_AND_ASSIGN(const Repair repaired,
+                              RepairMission(path(), dir_.File("repaired")));
+  EXPECT_EQ(repaired.history_rows, rows);
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto copy,
+                              MissionFile::Open(dir_.File("repaired")));
+  ExpectKept(*copy);
+}
+
+TEST_F(HistoryFileTest, JournalMustBeLoadedBeforeMoreIsWritten) {
+  Report(SampleReport(1, "a"));
+  Commit(false);
+  const std::string cut = dir_.File("cut");
+  for (const char* end : {"", "-wal"}) {
+    std::filesystem::copy_file(path() + end, cut + end);
+  }
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto again, MissionFile::Open(cut));
+  Report(SampleReport(2, "a"));
+  EXPECT_THAT(again->Commit(batch_),
+              StatusIs(absl::StatusCode::kFailedPrecondition,
+                       HasSubstr("Load it before")));
+  ASSERT_THAT(again->Load(), IsOk());
+  EXPECT_THAT(again->Commit(batch_), IsOk());
+}
+
+TEST_F(HistoryFileTest, AreaAndTimeFindWhatAPlainSearchFinds) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> latitude(-60, 60);
+  std::uniform_real_distribution<double> longitude(-180, 180);
+  // Fleets about forty places, also about the antimeridian.
+  for (int i = 0; i < 2000; ++i) {
+    const int who = i % 40;
+    std::mt19937 home(static_cast<unsigned>(who));
+    map::ContactReport report = SampleReport(i, "c" + std::to_string(who));
+    auto& fix = std::get<map::ContactFix>(report.observation);
+    fix.position = {.latitude_deg = latitude(home) + 1e-5 * i,
+                    .longitude_deg = longitude(home)};
+    if (who % 8 == 0) {
+      fix.position.longitude_deg = i % 80 < 40 ? 179.9999 : -179.9999;
+    }
+    Report(report);
+    if (i % 100 == 99) Commit(i % 500 == 499);
+  }
+  Commit(false);
+  int found_some = 0;
+  for (int i = 0; i < 60; ++i) {
+    HistoryArea area{.south_deg = latitude(random),
+                     .north_deg = 0,
+                     .west_deg = longitude(random),
+                     .east_deg = longitude(random)};
+    area.north_deg = area.south_deg + 20;
+    const Time from = At(200 + 30 * i);
+    const Time to = from + std::chrono::seconds(500);
+    std::vector<map::ContactEstimate> expected;
+    for (const auto& [key, kept] : kept_) {
+      for (const auto& [place, estimate] : kept) {
+        if (place.first >= from && place.first <= to &&
+            area.Holds(estimate.Position())) {
+          expected.push_back(estimate);
+        }
+      }
+    }
+    FATHOM_ASSERT_OK_AND_ASSIGN(
+        const std::vector<ContactHistoryRow> found,
+        file_->ReadContactHistoryIn(area, from, to, 10'000));
+    ASSERT_EQ(found.size(), expected.size()) << i;
+    for (std::size_t k = 0; k < found.size(); ++k) {
+      ASSERT_EQ(found[k].estimate, expected[k]);
+    }
+    if (expected.empty()) continue;
+    ++found_some;
+    EXPECT_THAT(
+        file_->ReadContactHistoryIn(area, from, to, expected.size() - 1),
+        StatusIs(absl::StatusCode::kResourceExhausted));
+  }
+  EXPECT_GT(found_some, 20);
+}
+
+TEST(HistoryArea, HoldsItsBordersAndCrossesTheAntimeridian) {
+  const HistoryArea plain{
+      .south_deg = 10, .north_deg = 20, .west_deg = 30, .east_deg = 40};
+  EXPECT_TRUE(plain.Holds({.latitude_deg = 10, .longitude_deg = 40}));
+  EXPECT_FALSE(plain.Holds({.latitude_deg = 9.9, .longitude_deg = 35}));
+  EXPECT_FALSE(plain.Holds({.latitude_deg = 15, .longitude_deg = 41}));
+  const HistoryArea across{
+      .south_deg = 10, .north_deg = 20, .west_deg = 170, .east_deg = -170};
+  EXPECT_TRUE(across.Holds({.latitude_deg = 15, .longitude_deg = 175}));
+  EXPECT_TRUE(across.Holds({.latitude_deg = 15, .longitude_deg = -175}));
+  EXPECT_FALSE(across.Holds({.latitude_deg = 15, .longitude_deg = 0}));
+}
+
+TEST_F(HistoryFileTest, WhatIsOlderThanAllowedGoesWithACheckpoint) {
+  file_->LimitHistory({.max_age = std::chrono::seconds(300), .max_bytes = {}});
+  // Blocks of 128 s each (reports once a second), a checkpoint after 1000.
+  for (int i = 0; i < 1000; ++i) {
+    Report(SampleReport(i, "a"));
+    if (i % 64 == 63 || i == 999) Commit(i == 999);
+  }
+  // The newest is of 999 s; 699 s and later stay, with the block that holds
+  // 699: from 640 = 5 * 128 on.
+  const HistoryTotal total = file_->Status().history;
+  EXPECT_EQ(total.forgotten_estimates, 640u);
+  EXPECT_EQ(total.estimates, 360u);
+  std::vector<std::uint64_t> revisions;
+  ASSERT_THAT(file_->ReadContactHistory({.source = {"c4i"}, .contact = {"a"}},
+                                        Time::min(), Time::max(),
+                                        [&](const ContactHistoryRow& row) {
+                                          revisions.push_back(row.revision);
+                                          return true;
+                                        }),
+              IsOk());
+  EXPECT_EQ(revisions.size(), 360u);
+  EXPECT_EQ(revisions.front(), 641u);
+  FATHOM_ASSERT_OK_AND_ASSIGN(const Proof proof, file_->Verify());
+  EXPECT_THAT(proof.problems, IsEmpty());
+}
+
+TEST_F(HistoryFileTest, WhatIsMoreThanAllowedGoesOldestFirst) {
+  for (int i = 0; i < 1280; ++i) {
+    Report(SampleReport(i, i % 2 == 0 ? "even" : "odd"));
+    if (i % 64 == 63) Commit(false);
+  }
+  Commit(true);
+  const HistoryTotal all = file_->Status().history;
+  EXPECT_EQ(all.estimates, 1280u);
+  file_->LimitHistory({.max_age = {}, .max_bytes = all.bytes / 2});
+  Report(SampleReport(1280, "even"));
+  Commit(true);
+  const HistoryTotal half = file_->Status().history;
+  EXPECT_LE(half.bytes, all.bytes / 2);
+  EXPECT_GT(half.bytes, all.bytes / 3);
+  EXPECT_EQ(half.estimates + half.forgotten_estimates, 1281u);
+  // Of both, the newest half.
+  for (const char* contact : {"even", "odd"}) {
+    std::vector<std::uint64_t> revisions;
+    ASSERT_THAT(
+        file_->ReadContactHistory({.source = {"c4i"}, .contact = {contact}},
+                                  Time::min(), Time::max(),
+                                  [&](const ContactHistoryRow& row) {
+                                    revisions.push_back(row.revision);
+                                    return true;
+                                  }),
+        IsOk());
+    EXPECT_GT(revisions.front(), 500u);
+    EXPECT_LT(revisions.front(), 900u);
+  }
+  // What was forgotten stays forgotten, and counted.
+  ASSERT_THAT(file_->Close(), IsOk());
+  file_.reset();
+  FATHOM_ASSERT_OK_AND_ASSIGN(file_, MissionFile::Open(path()));
+  EXPECT_EQ(file_->Status().history, half);
+}
+
+}  // namespace
+}  // namespace fathom::storage
