@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "absl/strings/str_format.h"
-#include "storage/crc32c.h"
+#include "base/crc32c.h"
 
 namespace fathom::storage {
 namespace {

@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "storage/crc32c.h"
+#include "base/crc32c.h"
 
 namespace fathom::storage {
 namespace {

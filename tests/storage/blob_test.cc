@@ -5,7 +5,7 @@
 #include <boost/crc.hpp>
 #include <random>
 
-#include "storage/crc32c.h"
+#include "base/crc32c.h"
 #include "tests/testing/status_matchers.h"
 
 namespace fathom::storage {

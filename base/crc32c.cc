@@ -1,9 +1,9 @@
-#include "storage/crc32c.h"
+#include "base/crc32c.h"
 
 #include <array>
 #include <cstddef>
 
-namespace fathom::storage {
+namespace fathom {
 namespace {
 
 constexpr std::uint32_t kReflectedPolynomial = 0x82F63B78;  // Of 0x1EDC6F41.
@@ -38,7 +38,7 @@ std::uint32_t LoadU32(const std::uint8_t* p) {
 
 }  // namespace
 
-std::uint32_t Crc32c(ByteSpan bytes) {
+std::uint32_t Crc32c(std::span<const std::uint8_t> bytes) {
   std::uint32_t crc = 0xFFFFFFFF;
   const std::uint8_t* p = bytes.data();
   std::size_t left = bytes.size();
@@ -56,4 +56,4 @@ std::uint32_t Crc32c(ByteSpan bytes) {
   return ~crc;
 }
 
-}  // namespace fathom::storage
+}  // namespace fathom
