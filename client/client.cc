@@ -80,7 +80,8 @@ absl::StatusOr<std::unique_ptr<Client>> Client::Connect(
       options.credentials != nullptr ? options.credentials
                                      : grpc::InsecureChannelCredentials(),
       arguments);
-  if (!channel->WaitForConnected(std::chrono::system_clock::now() +
+  if (options.connect_timeout.count() > 0 &&
+      !channel->WaitForConnected(std::chrono::system_clock::now() +
                                  options.connect_timeout)) {
     return absl::UnavailableError(absl::StrFormat(
         "no Fathom server answers at %s within %d ms: is fathomd running "

@@ -62,7 +62,8 @@ inline constexpr std::size_t kMaxMessageBytes = 64u << 20;
 inline constexpr int kMaxAttempts = 4;
 
 struct ClientOptions {
-  // How long Connect waits for a server that answers.
+  // How long Connect waits for a server that answers; 0: it does not, the
+  // first call does.
   std::chrono::milliseconds connect_timeout{5'000};
   // Deadline of each short call.
   std::chrono::milliseconds call_timeout{10'000};

@@ -79,4 +79,18 @@ std::optional<std::chrono::milliseconds> RetryDelay(
   return std::chrono::milliseconds(milliseconds);
 }
 
+bool MayMend(absl::StatusCode code) {
+  switch (code) {
+    case absl::StatusCode::kUnavailable:
+    case absl::StatusCode::kResourceExhausted:  // Storage full: waits for room.
+    case absl::StatusCode::kAborted:
+    case absl::StatusCode::kCancelled:  // By Reconnect, or by a dying server.
+    case absl::StatusCode::kInternal:   // RST_STREAM of a dying server.
+    case absl::StatusCode::kUnknown:
+      return true;
+    default:
+      return false;
+  }
+}
+
 }  // namespace fathom::client

@@ -36,6 +36,10 @@ std::vector<FieldError> FieldErrors(const absl::Status& status);
 // When the server asks to try again (google.rpc.RetryInfo), if it does.
 std::optional<std::chrono::milliseconds> RetryDelay(const absl::Status& status);
 
+// Whether a stream that ended so is worth a new connection: the server is
+// away, or full, or is going down.
+bool MayMend(absl::StatusCode code);
+
 }  // namespace fathom::client
 
 #endif  // FATHOM_CLIENT_ERRORS_H_

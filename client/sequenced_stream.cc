@@ -21,13 +21,6 @@ constexpr int kMaxBackoffDoublings = 5;  // 1.6 s.
 
 constexpr std::size_t kMaxSourceIdLength = 64;
 
-std::uint64_t EpochOrNow(std::uint64_t epoch) {
-  if (epoch != 0) return epoch;
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return static_cast<std::uint64_t>(
-      std::chrono::duration_cast<std::chrono::microseconds>(now).count());
-}
-
 absl::Status Validate(const IngestStreamOptions& options) {
   const std::string& id = options.source_id;
   const bool good_characters = std::all_of(id.begin(), id.end(), [](char c) {
@@ -46,21 +39,6 @@ absl::Status Validate(const IngestStreamOptions& options) {
     return absl::InvalidArgumentError("max_in_flight=0: must be at least 1");
   }
   return absl::OkStatus();
-}
-
-// Whether a new connection may mend it.
-bool IsCut(absl::StatusCode code) {
-  switch (code) {
-    case absl::StatusCode::kUnavailable:
-    case absl::StatusCode::kResourceExhausted:  // Storage full: waits for room.
-    case absl::StatusCode::kAborted:
-    case absl::StatusCode::kCancelled:  // By Reconnect, or by a dying server.
-    case absl::StatusCode::kInternal:   // RST_STREAM of a dying server.
-    case absl::StatusCode::kUnknown:
-      return true;
-    default:
-      return false;
-  }
 }
 
 template <typename T>
@@ -93,6 +71,13 @@ void AddCounters(const IngestAck& ack, IngestProgress& sum) {
 }
 
 }  // namespace
+
+std::uint64_t EpochOrNow(std::uint64_t epoch) {
+  if (epoch != 0) return epoch;
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return static_cast<std::uint64_t>(
+      std::chrono::duration_cast<std::chrono::microseconds>(now).count());
+}
 
 // One gRPC call. All members but context_ and read_ are guarded by the
 // owner's mutex_. A hold keeps OnDone away while writes may still start from
@@ -186,7 +171,7 @@ class SequencedStream::Connection final
       end = absl::UnavailableError("the server ended the stream");
     }
     owner_.cut_ = end;
-    if (!end.ok() && !IsCut(end.code())) owner_.permanent_ = end;
+    if (!end.ok() && !MayMend(end.code())) owner_.permanent_ = end;
     AddCounters(owner_.last_ack_, owner_.progress_);
     owner_.last_ack_ = IngestAck{};
     ended_ = true;

@@ -48,6 +48,9 @@ namespace fathom::client {
 // Largest message that Send takes: gRPC's default receive limit.
 inline constexpr std::size_t kMaxIngestMessageBytes = 4u << 20;
 
+// `epoch`, or for 0 the wall clock's microseconds (IngestStreamOptions::epoch).
+std::uint64_t EpochOrNow(std::uint64_t epoch);
+
 // An acknowledgement of either stream, decoded.
 struct IngestAck {
   std::uint64_t epoch = 0;

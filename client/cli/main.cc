@@ -79,17 +79,17 @@ int Main(int argc, char** argv) {
                  "Give up a call after this many seconds (default: 10, and "
                  "600 for imports, transfers and areas)")
       ->check(CLI::PositiveNumber);
-  app.add_option("--tls-ca", session.tls_ca,
+  app.add_option("--tls-ca", session.tls.ca,
                  "PEM file of the authority that signed the server's "
                  "certificate; speaks TLS instead of plain text")
       ->envname("FATHOM_TLS_CA")
       ->type_name("FILE");
-  app.add_option("--tls-cert", session.tls_cert,
+  app.add_option("--tls-cert", session.tls.cert,
                  "PEM file of our certificate, for servers that ask for one; "
                  "with --tls-key")
       ->envname("FATHOM_TLS_CERT")
       ->type_name("FILE");
-  app.add_option("--tls-key", session.tls_key, "PEM file of its private key")
+  app.add_option("--tls-key", session.tls.key, "PEM file of its private key")
       ->envname("FATHOM_TLS_KEY")
       ->type_name("FILE");
   app.add_flag("--json", session.json, "Print one JSON document");

@@ -3,55 +3,12 @@
 #include <google/protobuf/util/json_util.h>
 
 #include <cstdio>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <system_error>
+#include <utility>
 
-#include "absl/strings/str_format.h"
 #include "base/clock.h"
-#include "base/status_macros.h"
 #include "client/cli/exit_code.h"
 
 namespace fathom::client::cli {
-namespace {
-
-// A PEM file's text; "" for no file. Larger ones are no certificates.
-constexpr std::uintmax_t kMaxPemBytes = 1 << 20;
-absl::StatusOr<std::string> ReadPem(const std::string& path) {
-  if (path.empty()) return std::string();
-  std::error_code error;
-  const std::uintmax_t bytes = std::filesystem::file_size(path, error);
-  std::ifstream in(path, std::ios::binary);
-  if (error || !in) {
-    return FileError(
-        absl::NotFoundError(absl::StrFormat("%s: cannot be read", path)));
-  }
-  std::string text;
-  if (bytes <= kMaxPemBytes) {
-    text.assign(std::istreambuf_iterator<char>(in), {});
-  }
-  if (text.find("-----BEGIN") == std::string::npos) {
-    return FileError(absl::InvalidArgumentError(absl::StrFormat(
-        "%s: is no PEM file (it would hold -----BEGIN ...)", path)));
-  }
-  return text;
-}
-
-absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> TlsCredentials(
-    const Session& session) {
-  if (session.tls_cert.empty() != session.tls_key.empty()) {
-    return UsageError(
-        absl::InvalidArgumentError("--tls-cert and --tls-key belong together"));
-  }
-  grpc::SslCredentialsOptions options;
-  FATHOM_ASSIGN_OR_RETURN(options.pem_root_certs, ReadPem(session.tls_ca));
-  FATHOM_ASSIGN_OR_RETURN(options.pem_cert_chain, ReadPem(session.tls_cert));
-  FATHOM_ASSIGN_OR_RETURN(options.pem_private_key, ReadPem(session.tls_key));
-  return grpc::SslCredentials(options);
-}
-
-}  // namespace
 
 absl::StatusOr<std::unique_ptr<Client>> Session::Connect() const {
   ClientOptions options;
@@ -62,9 +19,14 @@ absl::StatusOr<std::unique_ptr<Client>> Session::Connect() const {
     options.call_timeout = timeout;
     options.long_call_timeout = timeout;
   }
-  if (!tls_ca.empty() || !tls_cert.empty() || !tls_key.empty()) {
-    FATHOM_ASSIGN_OR_RETURN(options.credentials, TlsCredentials(*this));
+  absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> credentials =
+      TlsCredentials(tls);
+  if (!credentials.ok()) {
+    return tls.cert.empty() != tls.key.empty()
+               ? UsageError(credentials.status())
+               : FileError(credentials.status());
   }
+  options.credentials = *std::move(credentials);
   return Client::Connect(server, options);
 }
 

@@ -20,6 +20,7 @@
 #include "base/time.h"
 #include "client/cli/exit_code.h"
 #include "client/client.h"
+#include "client/tls.h"
 
 namespace fathom::client::cli {
 
@@ -28,12 +29,7 @@ struct Session {
   // Bounds each call; 0: the library's defaults.
   double timeout_s = 0;
   bool json = false;
-  // PEM files. Any of them: TLS instead of plain text. tls_cert and tls_key
-  // are ours, where the server asks who we are; tls_ca signs the server's
-  // (empty: the system's authorities).
-  std::string tls_ca;
-  std::string tls_cert;
-  std::string tls_key;
+  TlsFiles tls = {};
   // Set by the verb that the command line names.
   std::function<absl::Status()> run = nullptr;
   // How the command ends if that went well.

@@ -1,0 +1,442 @@
+#include "client/spool.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_format.h"
+#include "base/crc32c.h"
+#include "base/status_macros.h"
+
+namespace fathom::client {
+namespace {
+
+constexpr std::string_view kMagic = "FTHMSPL1";
+constexpr std::size_t kSourceBytes = 64;
+constexpr std::size_t kHeaderBytes = 8 + 8 + 8 + kSourceBytes + 4;
+constexpr std::size_t kFrameBytes = 8;
+// A segment is an eighth of the whole, at most this: small enough that room
+// comes back soon, large enough that files are few.
+constexpr std::uint64_t kMostSegmentBytes = 8u << 20;
+// A segment that the server has whole is left behind only from this size on.
+constexpr std::uint64_t kWorthLeavingBytes = 1u << 15;
+constexpr std::size_t kReadBytes = 1u << 18;
+
+template <typename Word>
+void PutWord(Word value, char* out) {
+  for (std::size_t i = 0; i < sizeof value; ++i) {
+    out[i] = static_cast<char>(value >> (8 * i));
+  }
+}
+
+template <typename Word>
+Word GetWord(const char* in) {
+  Word value = 0;
+  for (std::size_t i = 0; i < sizeof value; ++i) {
+    value |= static_cast<Word>(
+        static_cast<Word>(static_cast<unsigned char>(in[i])) << (8 * i));
+  }
+  return value;
+}
+
+std::uint32_t Crc(std::string_view bytes) {
+  return Crc32c(
+      {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
+}
+
+absl::Status DiskError(const std::string& what, const std::string& path) {
+  const std::string text = absl::StrFormat(
+      "cannot %s %s: %s", what, path, std::generic_category().message(errno));
+  switch (errno) {
+    case ENOSPC:
+    case EDQUOT:
+      return absl::ResourceExhaustedError(text);
+    case EACCES:
+    case EPERM:
+    case EROFS:
+    case ENOTDIR:
+      return absl::PermissionDeniedError(text);
+    default:
+      return absl::DataLossError(text);
+  }
+}
+
+absl::Status Damaged(const std::string& path, std::uint64_t offset) {
+  return absl::DataLossError(absl::StrFormat(
+      "%s is damaged at byte %d; it was not changed", path, offset));
+}
+
+bool WriteWhole(int file, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(file, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) return false;
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return true;
+}
+
+// Appends up to `size` bytes of the file from `offset`; fewer at its end.
+bool ReadMore(int file, std::uint64_t offset, std::size_t size,
+              std::string& bytes) {
+  const std::size_t before = bytes.size();
+  bytes.resize(before + size);
+  std::size_t got = 0;
+  while (got < size) {
+    const ssize_t read = ::pread(file, bytes.data() + before + got, size - got,
+                                 static_cast<off_t>(offset + got));
+    if (read < 0 && errno == EINTR) continue;
+    if (read < 0) return false;
+    if (read == 0) break;
+    got += static_cast<std::size_t>(read);
+  }
+  bytes.resize(before + got);
+  return true;
+}
+
+// Names made and removed in the folder are on disk.
+absl::Status SyncFolder(const std::string& folder) {
+  const int file = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (file < 0) return DiskError("open", folder);
+  const bool synced = ::fsync(file) == 0;
+  ::close(file);
+  return synced ? absl::OkStatus() : DiskError("sync", folder);
+}
+
+struct Header {
+  std::uint64_t epoch;
+  std::uint64_t first;
+  std::string source_id;
+};
+
+std::string Encode(const Header& header) {
+  std::string bytes(kHeaderBytes, '\0');
+  kMagic.copy(bytes.data(), kMagic.size());
+  PutWord(header.epoch, bytes.data() + 8);
+  PutWord(header.first, bytes.data() + 16);
+  header.source_id.copy(bytes.data() + 24, kSourceBytes);
+  PutWord(Crc(std::string_view(bytes).substr(0, kHeaderBytes - 4)),
+          bytes.data() + kHeaderBytes - 4);
+  return bytes;
+}
+
+std::optional<Header> DecodeHeader(std::string_view bytes) {
+  if (bytes.size() < kHeaderBytes || !bytes.starts_with(kMagic) ||
+      Crc(bytes.substr(0, kHeaderBytes - 4)) !=
+          GetWord<std::uint32_t>(bytes.data() + kHeaderBytes - 4)) {
+    return std::nullopt;
+  }
+  const std::string_view source = bytes.substr(24, kSourceBytes);
+  return Header{.epoch = GetWord<std::uint64_t>(bytes.data() + 8),
+                .first = GetWord<std::uint64_t>(bytes.data() + 16),
+                .source_id = std::string(source.substr(0, source.find('\0')))};
+}
+
+absl::Status NothingThere(const SpoolOptions& options) {
+  return absl::NotFoundError(absl::StrFormat(
+      "the folder %s holds no buffered %s", options.folder, options.kind));
+}
+
+// A message at the head of `bytes`.
+enum class Frame { kWhole, kShort, kDamaged };
+Frame LookAtFrame(std::string_view bytes, std::size_t& size) {
+  if (bytes.size() < kFrameBytes) return Frame::kShort;
+  size = GetWord<std::uint32_t>(bytes.data());
+  if (size == 0) return Frame::kDamaged;
+  if (bytes.size() < kFrameBytes + size) return Frame::kShort;
+  return Crc(bytes.substr(kFrameBytes, size)) ==
+                 GetWord<std::uint32_t>(bytes.data() + 4)
+             ? Frame::kWhole
+             : Frame::kDamaged;
+}
+
+}  // namespace
+
+Spool::Spool(const SpoolOptions& options)
+    : options_(options),
+      segment_bytes_(std::min(options.max_bytes / 8, kMostSegmentBytes)),
+      source_id_(options.source_id),
+      epoch_(options.epoch) {}
+
+Spool::~Spool() {
+  for (const int file : {append_, read_, lock_}) {
+    if (file >= 0) ::close(file);
+  }
+}
+
+absl::StatusOr<std::unique_ptr<Spool>> Spool::Open(
+    const SpoolOptions& options) {
+  if (options.max_bytes < kLeastSpoolBytes) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("max_bytes=%d of a buffer must be at least %d",
+                        options.max_bytes, kLeastSpoolBytes));
+  }
+  if (options.source_id.size() > kSourceBytes) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("source_id=\"%s\": at most %d characters",
+                        options.source_id, kSourceBytes));
+  }
+  std::error_code error;
+  if (options.source_id.empty() &&
+      !std::filesystem::is_directory(options.folder, error)) {
+    return NothingThere(options);
+  }
+  std::filesystem::create_directories(options.folder, error);
+  if (error) {
+    return absl::PermissionDeniedError(absl::StrFormat(
+        "cannot make the folder %s: %s", options.folder, error.message()));
+  }
+  std::unique_ptr<Spool> spool(new Spool(options));
+  FATHOM_RETURN_IF_ERROR(spool->Lock());
+  FATHOM_RETURN_IF_ERROR(spool->OpenSegments());
+  spool->next_read_ = spool->first_sequence();
+  return spool;
+}
+
+absl::Status Spool::Lock() {
+  const std::string path = options_.folder + "/" + options_.kind + ".lock";
+  lock_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  if (lock_ < 0) return DiskError("open", path);
+  if (::flock(lock_, LOCK_EX | LOCK_NB) != 0) {
+    return absl::FailedPreconditionError(absl::StrFormat(
+        "the buffer %s is in use by another process", options_.folder));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status Spool::OpenSegments() {
+  std::vector<std::string> paths;
+  std::error_code error;
+  for (const auto& entry :
+       std::filesystem::directory_iterator(options_.folder, error)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with(options_.kind + "-") && name.ends_with(".spool")) {
+      paths.push_back(entry.path().string());
+    }
+  }
+  // Numbers of 20 digits: in order of name is in order of number.
+  std::sort(paths.begin(), paths.end());
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    const bool last = i + 1 == paths.size();
+    if (last && std::filesystem::file_size(paths[i], error) < kHeaderBytes) {
+      // Its making was cut short; nothing was taken into it.
+      std::filesystem::remove(paths[i], error);
+      continue;
+    }
+    Segment segment{.path = paths[i]};
+    FATHOM_RETURN_IF_ERROR(Scan(segment, last));
+    if (!segments_.empty() && segment.first != segments_.back().end()) {
+      return absl::DataLossError(absl::StrFormat(
+          "%s begins with message %d, the one before it ends with %d",
+          segment.path, segment.first, segments_.back().end() - 1));
+    }
+    bytes_ += segment.bytes;
+    segments_.push_back(std::move(segment));
+  }
+  if (segments_.empty()) {
+    if (source_id_.empty()) return NothingThere(options_);
+    return StartSegment(1);
+  }
+  const std::string& path = segments_.back().path;
+  append_ = ::open(path.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+  return append_ >= 0 ? absl::OkStatus() : DiskError("open", path);
+}
+
+absl::Status Spool::Scan(Segment& segment, bool last) {
+  const int file = ::open(segment.path.c_str(), O_RDWR | O_CLOEXEC);
+  if (file < 0) return DiskError("open", segment.path);
+  // At most kMostSegmentBytes and one message.
+  std::string bytes;
+  struct stat about = {};
+  const bool read =
+      ::fstat(file, &about) == 0 &&
+      ReadMore(file, 0, static_cast<std::size_t>(about.st_size), bytes);
+  absl::Status status =
+      read ? absl::OkStatus() : DiskError("read", segment.path);
+  const std::optional<Header> header = DecodeHeader(bytes);
+  if (status.ok() && !header.has_value()) status = Damaged(segment.path, 0);
+  if (status.ok()) {
+    if (source_id_.empty()) source_id_ = header->source_id;
+    if (header->source_id != source_id_) {
+      status = absl::InvalidArgumentError(absl::StrFormat(
+          "the buffer %s holds messages of source \"%s\", not of \"%s\"",
+          options_.folder, header->source_id, source_id_));
+    }
+    epoch_ = header->epoch;
+    segment.first = header->first;
+    segment.bytes = kHeaderBytes;
+  }
+  while (status.ok() && segment.bytes < bytes.size()) {
+    std::size_t size = 0;
+    if (LookAtFrame(std::string_view(bytes).substr(segment.bytes), size) ==
+        Frame::kWhole) {
+      segment.bytes += kFrameBytes + size;
+      ++segment.count;
+      continue;
+    }
+    if (!last) {
+      status = Damaged(segment.path, segment.bytes);
+    } else if (::ftruncate(file, static_cast<off_t>(segment.bytes)) != 0) {
+      status = DiskError("cut off the torn end of", segment.path);
+    }
+    break;
+  }
+  ::close(file);
+  return status;
+}
+
+absl::Status Spool::StartSegment(std::uint64_t first) {
+  if (append_ >= 0) FATHOM_RETURN_IF_ERROR(Sync());
+  Segment segment{.path = absl::StrFormat("%s/%s-%020d.spool", options_.folder,
+                                          options_.kind, first),
+                  .first = first,
+                  .bytes = kHeaderBytes};
+  const int file =
+      ::open(segment.path.c_str(),
+             O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC, 0644);
+  if (file < 0) return DiskError("make", segment.path);
+  absl::Status status;
+  if (!WriteWhole(
+          file,
+          Encode({.epoch = epoch_, .first = first, .source_id = source_id_})) ||
+      ::fsync(file) != 0) {
+    status = DiskError("write", segment.path);
+  }
+  if (status.ok()) status = SyncFolder(options_.folder);
+  if (!status.ok()) {
+    ::close(file);
+    ::unlink(segment.path.c_str());
+    return status;
+  }
+  if (append_ >= 0) ::close(append_);
+  append_ = file;
+  bytes_ += segment.bytes;
+  segments_.push_back(std::move(segment));
+  return absl::OkStatus();
+}
+
+bool Spool::HasRoom(std::size_t message_bytes) const {
+  // A new segment's header too, whether it is needed or not.
+  return bytes_ + kHeaderBytes + kFrameBytes + message_bytes <=
+         options_.max_bytes;
+}
+
+absl::Status Spool::Append(std::string_view message) {
+  if (!HasRoom(message.size())) {
+    return absl::ResourceExhaustedError(
+        absl::StrFormat("the buffer %s is full: %d of %d bytes",
+                        options_.folder, bytes_, options_.max_bytes));
+  }
+  if (segments_.back().count > 0 &&
+      segments_.back().bytes + kFrameBytes + message.size() > segment_bytes_) {
+    FATHOM_RETURN_IF_ERROR(StartSegment(segments_.back().end()));
+  }
+  std::string frame(kFrameBytes, '\0');
+  PutWord(static_cast<std::uint32_t>(message.size()), frame.data());
+  PutWord(Crc(message), frame.data() + 4);
+  frame += message;
+  Segment& segment = segments_.back();
+  if (!WriteWhole(append_, frame)) {
+    const absl::Status status = DiskError("write", segment.path);
+    // No half message may stand before the next one.
+    if (::ftruncate(append_, static_cast<off_t>(segment.bytes)) != 0) {
+      return absl::DataLossError(std::string(status.message()));
+    }
+    return status;
+  }
+  segment.bytes += frame.size();
+  bytes_ += frame.size();
+  ++segment.count;
+  unsynced_ = true;
+  return absl::OkStatus();
+}
+
+absl::StatusOr<bool> Spool::Read(std::string& message) {
+  if (next_read_ > last_sequence()) return false;
+  // The last one that begins at or before it.
+  const auto segment = std::prev(std::upper_bound(
+      segments_.begin(), segments_.end(), next_read_,
+      [](std::uint64_t number, const Segment& s) { return number < s.first; }));
+  if (read_ < 0 || read_first_ != segment->first) {
+    if (read_ >= 0) ::close(read_);
+    read_ = ::open(segment->path.c_str(), O_RDONLY | O_CLOEXEC);
+    if (read_ < 0) return DiskError("open", segment->path);
+    read_first_ = segment->first;
+    read_offset_ = kHeaderBytes;
+    ahead_.clear();
+    ahead_used_ = 0;
+  }
+  for (;;) {
+    std::size_t size = 0;
+    const std::string_view rest = std::string_view(ahead_).substr(ahead_used_);
+    const Frame frame = LookAtFrame(rest, size);
+    if (frame == Frame::kWhole) {
+      message.assign(rest.substr(kFrameBytes, size));
+      ahead_used_ += kFrameBytes + size;
+      ++next_read_;
+      return true;
+    }
+    if (frame == Frame::kDamaged || read_offset_ >= segment->bytes) {
+      return Damaged(segment->path, read_offset_ - rest.size());
+    }
+    ahead_.erase(0, ahead_used_);
+    ahead_used_ = 0;
+    const std::size_t before = ahead_.size();
+    // Up to what Append has written whole.
+    if (!ReadMore(read_, read_offset_,
+                  std::min<std::uint64_t>(kReadBytes + size,
+                                          segment->bytes - read_offset_),
+                  ahead_)) {
+      return DiskError("read", segment->path);
+    }
+    if (ahead_.size() == before) return Damaged(segment->path, read_offset_);
+    read_offset_ += ahead_.size() - before;
+  }
+}
+
+absl::Status Spool::Release(std::uint64_t sequence) {
+  const Segment& growing = segments_.back();
+  if (sequence + 1 >= growing.end() && growing.count > 0 &&
+      growing.bytes > kWorthLeavingBytes) {
+    FATHOM_RETURN_IF_ERROR(StartSegment(growing.end()));
+  }
+  while (segments_.size() > 1 && segments_.front().end() <= sequence + 1) {
+    if (::unlink(segments_.front().path.c_str()) != 0) {
+      return DiskError("remove", segments_.front().path);
+    }
+    bytes_ -= segments_.front().bytes;
+    segments_.pop_front();
+  }
+  next_read_ = std::max(next_read_, first_sequence());
+  return absl::OkStatus();
+}
+
+absl::Status Spool::Clear() {
+  if (segments_.back().count > 0) {
+    FATHOM_RETURN_IF_ERROR(StartSegment(segments_.back().end()));
+  }
+  return Release(last_sequence());
+}
+
+absl::Status Spool::Sync() {
+  if (!unsynced_) return absl::OkStatus();
+  if (::fdatasync(append_) != 0) {
+    return DiskError("sync", segments_.back().path);
+  }
+  unsynced_ = false;
+  return absl::OkStatus();
+}
+
+}  // namespace fathom::client

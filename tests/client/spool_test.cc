@@ -1,0 +1,193 @@
+#include "client/spool.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "tests/testing/status_matchers.h"
+
+namespace fathom::client {
+namespace {
+
+using ::fathom::testing::StatusIs;
+using ::testing::HasSubstr;
+
+class SpoolTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name =
+        (std::filesystem::path(::testing::TempDir()) / "fathom-spool.XXXXXX")
+            .string();
+    folder_ = mkdtemp(name.data());
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  absl::StatusOr<std::unique_ptr<Spool>> Open(
+      const std::string& source = "uuv-1", std::uint64_t epoch = 7) {
+    return Spool::Open({.folder = folder_,
+                        .kind = "pings",
+                        .source_id = source,
+                        .epoch = epoch,
+                        .max_bytes = kLeastSpoolBytes});
+  }
+
+  std::vector<std::string> Segments() const {
+    std::vector<std::string> paths;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_)) {
+      if (entry.path().extension() == ".spool") {
+        paths.push_back(entry.path().string());
+      }
+    }
+    std::sort(paths.begin(), paths.end());
+    return paths;
+  }
+
+  static std::vector<std::string> ReadAll(Spool& spool) {
+    std::vector<std::string> all;
+    std::string message;
+    for (;;) {
+      const absl::StatusOr<bool> read = spool.Read(message);
+      FATHOM_EXPECT_OK(read);
+      if (!read.ok() || !*read) return all;
+      all.push_back(message);
+    }
+  }
+
+  std::string folder_;
+};
+
+TEST_F(SpoolTest, GivesBackInOrderWhatItTookAcrossALife) {
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
+    EXPECT_EQ(spool->last_sequence(), 0u);
+    for (const char* text : {"a", "bb", "ccc"}) {
+      FATHOM_ASSERT_OK(spool->Append(text));
+    }
+    EXPECT_EQ(ReadAll(*spool), (std::vector<std::string>{"a", "bb", "ccc"}));
+  }
+  // Another epoch is asked for: the old one goes on.
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open("uuv-1", 9));
+  EXPECT_EQ(spool->epoch(), 7u);
+  EXPECT_EQ(spool->first_sequence(), 1u);
+  EXPECT_EQ(spool->last_sequence(), 3u);
+  FATHOM_ASSERT_OK(spool->Append("d"));
+  EXPECT_EQ(spool->last_sequence(), 4u);
+  EXPECT_EQ(ReadAll(*spool), (std::vector<std::string>{"a", "bb", "ccc", "d"}));
+}
+
+TEST_F(SpoolTest, WhatTheServerHasLeavesTheDiskAndTheNumbersGoOn) {
+  const std::string message(1 << 20, 'x');
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
+    // Segments of 16 MiB / 8: one message each, for two and their frames are
+    // above 2 MiB.
+    for (int i = 0; i < 6; ++i) FATHOM_ASSERT_OK(spool->Append(message));
+    EXPECT_EQ(Segments().size(), 6u);
+    FATHOM_ASSERT_OK(spool->Release(4));
+    EXPECT_EQ(Segments().size(), 2u);
+    EXPECT_EQ(spool->first_sequence(), 5u);
+    EXPECT_EQ(ReadAll(*spool).size(), 2u);
+    FATHOM_ASSERT_OK(spool->Release(6));
+    // An empty one that knows the number stays: 92 bytes of header.
+    EXPECT_EQ(spool->bytes(), 92u);
+  }
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
+  EXPECT_EQ(spool->last_sequence(), 6u);
+  EXPECT_TRUE(ReadAll(*spool).empty());
+  FATHOM_ASSERT_OK(spool->Append("seven"));
+  EXPECT_EQ(spool->last_sequence(), 7u);
+  FATHOM_ASSERT_OK(spool->Release(7));
+  FATHOM_ASSERT_OK(spool->Clear());
+  EXPECT_EQ(spool->bytes(), 92u);
+}
+
+TEST_F(SpoolTest, TakesWhatFitsAndNotOneMore) {
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
+  const std::string message(1 << 20, 'x');
+  int taken = 0;
+  while (spool->HasRoom(message.size())) {
+    FATHOM_ASSERT_OK(spool->Append(message));
+    ++taken;
+  }
+  // 16 x 1 MiB leave no room for their frames.
+  EXPECT_EQ(taken, 15);
+  EXPECT_THAT(spool->Append(message),
+              StatusIs(absl::StatusCode::kResourceExhausted));
+  EXPECT_EQ(spool->last_sequence(), 15u);
+  EXPECT_LE(spool->bytes(), kLeastSpoolBytes);
+  FATHOM_ASSERT_OK(spool->Release(1));
+  FATHOM_EXPECT_OK(spool->Append(message));
+}
+
+TEST_F(SpoolTest, ATornEndIsCutOffAndTheRestIsThere) {
+  for (const std::string& tail :
+       {std::string("\x05\0\0\0", 4), std::string("\x05\0\0\0....ab", 10),
+        std::string("\x02\0\0\0....ab", 10), std::string(64, '\0')}) {
+    {
+      FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
+      FATHOM_ASSERT_OK(spool->Append("whole"));
+    }
+    std::ofstream(Segments().back(), std::ios::app | std::ios::binary) << tail;
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
+    FATHOM_ASSERT_OK(spool->Append("next"));
+    std::vector<std::string> all = ReadAll(*spool);
+    ASSERT_GE(all.size(), 2u);
+    EXPECT_EQ(all[all.size() - 2], "whole");
+    EXPECT_EQ(all.back(), "next");
+    FATHOM_ASSERT_OK(spool->Release(spool->last_sequence()));
+  }
+  // A segment whose making was cut short holds nothing.
+  std::ofstream(folder_ + "/pings-00000000000000000099.spool") << "FTHM";
+  FATHOM_EXPECT_OK(Open());
+  EXPECT_EQ(Segments().size(), 1u);
+}
+
+TEST_F(SpoolTest, DamageIsRefusedAndChangedByNobody) {
+  const std::string message(1 << 20, 'x');
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
+    for (int i = 0; i < 3; ++i) FATHOM_ASSERT_OK(spool->Append(message));
+  }
+  const std::string path = Segments()[1];
+  const auto size = std::filesystem::file_size(path);
+  {
+    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(5000);
+    file.put('y');
+  }
+  EXPECT_THAT(Open(), StatusIs(absl::StatusCode::kDataLoss, HasSubstr(path)));
+  EXPECT_EQ(std::filesystem::file_size(path), size);
+  // One that is missing in the middle.
+  std::filesystem::remove(path);
+  EXPECT_THAT(Open(), StatusIs(absl::StatusCode::kDataLoss,
+                               HasSubstr("begins with message 3")));
+}
+
+TEST_F(SpoolTest, IsOneSourcesAndOneProcesss) {
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
+    EXPECT_THAT(Open(), StatusIs(absl::StatusCode::kFailedPrecondition,
+                                 HasSubstr("in use")));
+  }
+  EXPECT_THAT(Open("uuv-2"),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("uuv-1")));
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open(""));
+  EXPECT_EQ(spool->source_id(), "uuv-1");
+  EXPECT_THAT(
+      Spool::Open({.folder = folder_, .kind = "reports", .source_id = ""}),
+      StatusIs(absl::StatusCode::kNotFound));
+  EXPECT_THAT(Spool::Open({.folder = folder_,
+                           .kind = "x",
+                           .source_id = "a",
+                           .max_bytes = kLeastSpoolBytes - 1}),
+              StatusIs(absl::StatusCode::kInvalidArgument));
+}
+
+}  // namespace
+}  // namespace fathom::client
