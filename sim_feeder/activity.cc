@@ -1,10 +1,12 @@
 #include "sim_feeder/activity.h"
 
 #include <cstdio>
+#include <vector>
 
 #include "absl/strings/str_format.h"
 #include "base/status_macros.h"
 #include "client/proto_time.h"
+#include "sim_feeder/message_sink.h"
 
 namespace fathom::feeder {
 
@@ -37,6 +39,21 @@ absl::Status CompleteActivity(const client::Client& client,
                 activity_id, response.transfer().local_cells(),
                 response.transfer().leaves_written());
   return absl::OkStatus();
+}
+
+absl::StatusOr<ActivityCounts> CountsOf(const client::Client& client,
+                                        const std::string& activity_id) {
+  FATHOM_ASSIGN_OR_RETURN(const v1::GetMissionStatusResponse mission,
+                          client.GetMissionStatus());
+  for (const v1::ActivityStatus& activity : mission.activities()) {
+    if (activity.activity_id() != activity_id) continue;
+    return ActivityCounts{
+        .measurements_accepted = activity.measurements_accepted(),
+        .rejects = RejectCounts(std::vector<v1::RejectCount>(
+            activity.rejects().begin(), activity.rejects().end()))};
+  }
+  return absl::NotFoundError(
+      absl::StrFormat("the server has no activity \"%s\"", activity_id));
 }
 
 }  // namespace fathom::feeder

@@ -1,11 +1,14 @@
-// Opening and completing the activity that a run's pings belong to.
+// Opening, counting and completing the activity that a run's pings belong to.
 
 #ifndef FATHOM_SIM_FEEDER_ACTIVITY_H_
 #define FATHOM_SIM_FEEDER_ACTIVITY_H_
 
+#include <cstdint>
+#include <map>
 #include <string>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "base/time.h"
 #include "client/client.h"
 #include "fathom/v1/mission_service.pb.h"
@@ -31,6 +34,17 @@ absl::Status OpenActivity(const client::Client& client,
 // standard error. Errors: the server's.
 absl::Status CompleteActivity(const client::Client& client,
                               const std::string& activity_id);
+
+// What the server has counted of an activity, over all links and restarts.
+struct ActivityCounts {
+  std::uint64_t measurements_accepted = 0;
+  // By reason, as RejectCounts.
+  std::map<std::string, std::uint64_t> rejects = {};
+};
+
+// Errors: NOT_FOUND, and the server's.
+absl::StatusOr<ActivityCounts> CountsOf(const client::Client& client,
+                                        const std::string& activity_id);
 
 }  // namespace fathom::feeder
 

@@ -116,9 +116,11 @@ void CountObstacles(const std::vector<Place>& places,
   }
 }
 
-// Adds one estimate, which must be for `seconds` after the survey's start.
-void AddEstimate(const SurveyRecord& survey, const Ship& ship, double seconds,
-                 const v1::ContactEstimate& estimate, ContactScore& score) {
+// Adds one estimate, which must be for `seconds` after the survey's start;
+// tells where it was.
+TrackPoint AddEstimate(const SurveyRecord& survey, const Ship& ship,
+                       double seconds, const v1::ContactEstimate& estimate,
+                       ContactScore& score) {
   const PlanePoint truth = ship.PlaceAt(seconds);
   const map::NedFrame here(
       {.latitude_deg = estimate.position().latitude_deg(),
@@ -127,10 +129,15 @@ void AddEstimate(const SurveyRecord& survey, const Ship& ship, double seconds,
       here.ToNed(map::NedFrame(survey.area.south_west)
                      .ToGeodetic(truth.north_m, truth.east_m));
   // Row-major upper triangle: nn ne n.vn n.ve ee ...
-  score.Add(-away.north_m, -away.east_m,
-            {.nn = estimate.covariance(0),
-             .ne = estimate.covariance(1),
-             .ee = estimate.covariance(4)});
+  const PositionCovariance covariance = {.nn = estimate.covariance(0),
+                                         .ne = estimate.covariance(1),
+                                         .ee = estimate.covariance(4)};
+  score.Add(-away.north_m, -away.east_m, covariance);
+  return {.at_s = seconds,
+          .truth = truth,
+          .estimate = {.north_m = truth.north_m - away.north_m,
+                       .east_m = truth.east_m - away.east_m},
+          .covariance = covariance};
 }
 
 // The stored estimates after each report.
@@ -149,12 +156,15 @@ absl::Status AddHistory(const client::Client& client,
     return absl::OkStatus();
   }
   FATHOM_RETURN_IF_ERROR(history.status());
+  ContactTrack track = {.contact_id = ship.id};
   for (const v1::ContactEstimate& estimate : *history) {
     const double seconds =
         ToSeconds(client::FromProto(estimate.time()) - survey.start_time);
     if (seconds < kSettlingS || estimate.covariance_size() != 10) continue;
-    AddEstimate(survey, ship, seconds, estimate, result.during);
+    track.points.push_back(
+        AddEstimate(survey, ship, seconds, estimate, result.during));
   }
+  if (!track.points.empty()) result.tracks.push_back(std::move(track));
   return absl::OkStatus();
 }
 
@@ -255,7 +265,7 @@ absl::Status Evaluate(const EvaluateOptions& options) {
   FATHOM_ASSIGN_OR_RETURN(const std::shared_ptr<const LocalTerrain> seabed,
                           truth.SeabedAbout(survey.area, kEvaluationMarginM));
   FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<client::Client> client,
-                          client::Client::Connect(options.server, {}));
+                          Connect(options.link));
   FATHOM_ASSIGN_OR_RETURN(const DepthEvaluation depth,
                           EvaluateDepth(*client, *seabed, survey.area,
                                         options.time.value_or(survey.end_time),

@@ -27,6 +27,7 @@
 #include "absl/status/statusor.h"
 #include "client/client.h"
 #include "fathom/v1/types.pb.h"
+#include "sim_feeder/link.h"
 #include "sim_feeder/local_terrain.h"
 #include "sim_feeder/score.h"
 #include "sim_feeder/survey_record.h"
@@ -38,7 +39,8 @@ namespace fathom::feeder {
 inline constexpr double kEvaluationMarginM = 50.0;
 
 struct EvaluateOptions {
-  std::string server;
+  // Server and certificates.
+  LinkOptions link;
   TruthOptions truth;
   // A survey record, for area, ships and times; or only an area.
   std::string survey_path;
@@ -80,6 +82,20 @@ struct DepthEvaluation {
   std::vector<PlaceAnswer> places;
 };
 
+// One estimate of a contact and where it truly was, in the plane about the
+// area's south-west corner.
+struct TrackPoint {
+  double at_s = 0;  // Since the start of the run.
+  PlanePoint truth;
+  PlanePoint estimate;
+  PositionCovariance covariance;
+};
+
+struct ContactTrack {
+  std::string contact_id;
+  std::vector<TrackPoint> points = {};
+};
+
 struct ContactEvaluation {
   // The stored estimates after each report, from the second minute on.
   ContactScore during;
@@ -87,6 +103,8 @@ struct ContactEvaluation {
   std::map<int, ContactScore> predicted;
   // Questions about a ship that the server had no estimate for.
   std::uint64_t missing = 0;
+  // What `during` counts, by ship; ships without estimates are left out.
+  std::vector<ContactTrack> tracks;
 };
 
 // Errors: of the queries.

@@ -14,6 +14,7 @@
 #include "client/cli/colormap.h"
 #include "client/cli/value_scale.h"
 #include "sim_feeder/evaluation_report.h"
+#include "sim_feeder/track_picture.h"
 
 namespace fathom::feeder {
 namespace {
@@ -239,6 +240,25 @@ std::string PlacesCsv(const DepthEvaluation& depth) {
   return text;
 }
 
+std::string TracksCsv(const ContactEvaluation& contacts) {
+  std::string text =
+      "contact_id,at_s,truth_north_m,truth_east_m,north_m,east_m,"
+      "variance_nn_m2,covariance_ne_m2,variance_ee_m2,nees\n";
+  for (const ContactTrack& track : contacts.tracks) {
+    for (const TrackPoint& point : track.points) {
+      absl::StrAppendFormat(
+          &text, "%s,%.3f,%.2f,%.2f,%.2f,%.2f,%.6g,%.6g,%.6g,%.4f\n",
+          track.contact_id, point.at_s, point.truth.north_m, point.truth.east_m,
+          point.estimate.north_m, point.estimate.east_m, point.covariance.nn,
+          point.covariance.ne, point.covariance.ee,
+          PositionNees(point.estimate.north_m - point.truth.north_m,
+                       point.estimate.east_m - point.truth.east_m,
+                       point.covariance));
+    }
+  }
+  return text;
+}
+
 }  // namespace
 
 absl::Status WriteEvaluation(const std::string& folder,
@@ -252,6 +272,12 @@ absl::Status WriteEvaluation(const std::string& folder,
                                    EvaluationJson(depth, contacts) + "\n"));
   FATHOM_RETURN_IF_ERROR(
       WriteText((path / "places.csv").string(), PlacesCsv(depth)));
+  if (!contacts.tracks.empty()) {
+    FATHOM_RETURN_IF_ERROR(
+        WriteText((path / "tracks.csv").string(), TracksCsv(contacts)));
+    FATHOM_RETURN_IF_ERROR(
+        DrawTracks((path / "tracks.png").string(), title, contacts));
+  }
   Canvas canvas(kWidth, kHeight);
   canvas.Text(title, kLeft, 38, {.size = 20, .bold = true});
   DrawErrors(canvas, area, depth);

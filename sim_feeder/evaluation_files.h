@@ -3,6 +3,9 @@
 //   evaluation.json  EvaluationJson
 //   places.csv       every place asked that has a truth: where, truth, the
 //                    map's mean, std and kind of evidence
+//   tracks.csv       where there are contacts: each estimate with its
+//                    covariance, and the truth
+//   tracks.png       the same over the area (track_picture.h)
 //   evaluation.png   error of the map's depth over the area; stated against
 //                    observed probability; errors in stated deviations beside
 //                    the normal curve

@@ -86,7 +86,7 @@ std::vector<SonarMeasurement> MeasureForward(const LocalTerrain& terrain,
     const double dy_m =
         (group.column + 0.5) * options.sonar_cell_m - sonar.east_m;
     measurements.push_back(
-        {.range_m = std::hypot(dx_m, dy_m),
+        {.range_m = std::sqrt(dx_m * dx_m + dy_m * dy_m),
          .bearing_rad = WrapToPi(std::atan2(dy_m, dx_m) - sonar.course_rad),
          .depth_m = group.depth_sum_m / group.beam_count + noise.mean_m,
          .std_m = std::max(options.least_std_m,

@@ -13,6 +13,7 @@
 #include "base/status_macros.h"
 #include "base/time.h"
 #include "sim_feeder/evaluate_command.h"
+#include "sim_feeder/link.h"
 #include "sim_feeder/questions_command.h"
 #include "sim_feeder/replay/replay_command.h"
 #include "sim_feeder/run_command.h"
@@ -188,16 +189,62 @@ void AddVehicleAndSonar(CLI::App& app, Scenario& scenario) {
          "Between C4I fixes of one ship; 0: none");
 }
 
-// The server and how this sender is known to it; the option of the server.
-template <typename Options>
-CLI::Option* AddLink(CLI::App& app, Options& options,
+// The server; `without`: what happens without one.
+CLI::Option* AddServer(CLI::App& app, LinkOptions& link,
+                       const std::string& without) {
+  const std::string tls = "TLS (PEM files; any of them: no plain text)";
+  const auto file = [&](const std::string& name, std::string& path,
+                        const std::string& help, const std::string& variable) {
+    app.add_option(name, path, help)
+        ->envname(variable)
+        ->type_name("FILE")
+        ->group(tls);
+  };
+  file("--tls-ca", link.tls.ca,
+       "The authority that signed the server's certificate (default: the "
+       "system's)",
+       "FATHOM_TLS_CA");
+  file("--tls-cert", link.tls.cert,
+       "Our certificate, for servers that ask for one; with --tls-key",
+       "FATHOM_TLS_CERT");
+  file("--tls-key", link.tls.key, "Its private key", "FATHOM_TLS_KEY");
+  return app.add_option(
+      "--server", link.server,
+      "host:port or unix:/path" +
+          (without.empty() ? "" : " (without: " + without + ")"));
+}
+
+void AddPatience(CLI::App& app, LinkOptions& link) {
+  app.add_option("--patience-s", link.patience_s,
+                 "How long the server may be away, or make nothing durable, "
+                 "before we give up; with --buffer: at the end alone")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 1e6));
+}
+
+// The server, how this sender is known to it, and what happens while it is
+// away; the option of the server.
+CLI::Option* AddLink(CLI::App& app, LinkOptions& link,
                      const std::string& without) {
-  app.add_option("--source", options.source_id, "Source id of all messages")
+  app.add_option("--source", link.source_id, "Source id of all messages")
       ->capture_default_str();
-  app.add_option("--epoch", options.epoch,
-                 "Numbering epoch; 0: the wall clock");
-  return app.add_option("--server", options.server,
-                        "host:port or unix:/path (without: " + without + ")");
+  app.add_option("--epoch", link.epoch, "Numbering epoch; 0: the wall clock");
+  CLI::Option* server = AddServer(app, link, without);
+  AddPatience(app, link);
+  CLI::Option* buffer =
+      app.add_option("--buffer", link.buffer,
+                     "Keep messages in this folder until the server has them: "
+                     "the run goes on while it is away, and what is left is "
+                     "sent by the next run with this folder, or by `send`")
+          ->type_name("FOLDER")
+          ->needs(server);
+  app.add_option("--buffer-mib", link.buffer_mib,
+                 "Its size for pings, and for reports. When it is full a paced "
+                 "run drops what is new and counts it, one flat out waits")
+      ->capture_default_str()
+      ->check(CLI::Range(16, 1'000'000))
+      ->needs(buffer);
+  return server;
 }
 
 // Where messages go without a server.
@@ -213,15 +260,15 @@ void AddRecordFiles(CLI::App& app, Options& options, CLI::Option* server) {
 
 void AddOut(CLI::App& app, std::string& folder) {
   app.add_option("--out", folder,
-                 "Write evaluation.json, places.csv and evaluation.png into "
-                 "this folder")
+                 "Write figures (JSON), places and tracks (CSV) and pictures "
+                 "of both (PNG) into this folder")
       ->type_name("FOLDER");
 }
 
 CLI::App* AddRun(CLI::App& app, RunOptions& run) {
   CLI::App* command =
       app.add_subcommand("run", "Survey an area and send what is heard");
-  CLI::Option* server = AddLink(*command, run, "no server");
+  CLI::Option* server = AddLink(*command, run.link, "no server");
   command->add_option("--activity", run.scenario.activity_id, "Activity id")
       ->required();
   AddActivity(*command, run);
@@ -239,8 +286,25 @@ CLI::App* AddRun(CLI::App& app, RunOptions& run) {
       ->excludes(pings);
   AddTime(*command, "--start-time", run.start_time,
           "Time of the first ping (default: so that the run ends now)");
-  command->add_option("--rate", run.rate, "Times real time; 0: flat out")
+  command
+      ->add_option("--rate", run.rate,
+                   "Times real time, whatever the server does; 0: flat out")
       ->capture_default_str();
+  command
+      ->add_option("--prepare-mib", run.prepare_mib,
+                   "Make so much of the messages (as sent; twice that in "
+                   "memory) before the first goes out: to load a server, not "
+                   "this machine's simulation")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 16'384));
+  command
+      ->add_option("--vehicles", run.vehicles,
+                   "So many at once, each with its own noise, its own source "
+                   "and activity (ID-1, ID-2, ...)")
+      ->capture_default_str()
+      ->check(CLI::Range(1, kMaxVehicles));
+  command->add_flag("--share-activity", run.share_activity,
+                    "All vehicles survey the one activity");
   AddVehicleAndSonar(*command, run.scenario);
   command->add_option("--track-out", run.track_out, "Write the track, CSV");
   AddRecordFiles(*command, run, server);
@@ -263,7 +327,7 @@ CLI::App* AddReplay(CLI::App& app, ReplayOptions& replay) {
                    "What the files are (default: told from their content)")
       ->check(CLI::IsMember({"nmea", "table", "autoferry"}));
   CLI::Option* server =
-      AddLink(*command, replay, "only say what is in the files");
+      AddLink(*command, replay.link, "only say what is in the files");
   command
       ->add_option("--rate", replay.rate,
                    "Times the recorded pace; 0: flat out")
@@ -315,7 +379,7 @@ CLI::App* AddScenario(CLI::App& app, ScenarioOptions& scenario) {
   command->add_option("file", scenario.path, "Scenario, YAML")
       ->required()
       ->type_name("FILE");
-  AddLink(*command, scenario, "only check the file");
+  AddLink(*command, scenario.link, "only check the file");
   command->add_option("--seed", scenario.seed,
                       "Seed of everything drawn (default: the file's)");
   command->add_option("--rate", scenario.rate, "Times real time; 0: flat out")
@@ -331,8 +395,7 @@ CLI::App* AddScenario(CLI::App& app, ScenarioOptions& scenario) {
 CLI::App* AddEvaluate(CLI::App& app, EvaluateOptions& evaluate) {
   CLI::App* command = app.add_subcommand(
       "evaluate", "Ask the server and compare with the truth");
-  command->add_option("--server", evaluate.server, "host:port or unix:/path")
-      ->required();
+  AddServer(*command, evaluate.link, "")->required();
   AddTruth(*command, evaluate.truth);
   CLI::Option* corner = AddArea(*command, evaluate.area);
   command
@@ -347,6 +410,19 @@ CLI::App* AddEvaluate(CLI::App& app, EvaluateOptions& evaluate) {
       ->capture_default_str();
   AddOut(*command, evaluate.out);
   command->add_flag("--json", evaluate.json, "Print one line of JSON");
+  return command;
+}
+
+CLI::App* AddSend(CLI::App& app, LinkOptions& link) {
+  CLI::App* command = app.add_subcommand(
+      "send",
+      "Send what a run with --buffer left behind, and wait until the "
+      "server has it");
+  command->add_option("--buffer", link.buffer, "The run's buffer")
+      ->required()
+      ->type_name("FOLDER");
+  AddServer(*command, link, "")->required();
+  AddPatience(*command, link);
   return command;
 }
 
@@ -406,10 +482,12 @@ int Main(int argc, char** argv) {
   QuestionsOptions questions;
   ReplayOptions replay;
   ScenarioOptions scenario;
+  LinkOptions send;
   const CLI::App* run_command = AddRun(app, run);
   const CLI::App* replay_command = AddReplay(app, replay);
   const CLI::App* scenario_command = AddScenario(app, scenario);
   const CLI::App* evaluate_command = AddEvaluate(app, evaluate);
+  const CLI::App* send_command = AddSend(app, send);
   AddQuestions(app, questions);
   CLI11_PARSE(app, argc, argv);
 
@@ -427,6 +505,8 @@ int Main(int argc, char** argv) {
   } else if (evaluate_command->parsed()) {
     status = CheckArea(*evaluate_command, !evaluate.survey_path.empty());
     if (status.ok()) status = Evaluate(evaluate);
+  } else if (send_command->parsed()) {
+    status = SendBuffered(send);
   } else {
     status = PrintQuestions(questions);
   }

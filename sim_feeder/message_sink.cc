@@ -55,12 +55,17 @@ absl::Status CloseWritten(std::ofstream& file) {
 }  // namespace
 
 std::map<std::string, std::uint64_t> RejectCounts(
-    const client::IngestProgress& progress) {
+    std::span<const v1::RejectCount> rejects) {
   std::map<std::string, std::uint64_t> counts;
-  for (const v1::RejectCount& reject : progress.rejects) {
+  for (const v1::RejectCount& reject : rejects) {
     counts[ReasonName(reject.reason())] += reject.count();
   }
   return counts;
+}
+
+std::map<std::string, std::uint64_t> RejectCounts(
+    const client::IngestProgress& progress) {
+  return RejectCounts(progress.rejects);
 }
 
 std::string RejectNote(const SinkState& state) {
@@ -71,7 +76,11 @@ std::string RejectNote(const SinkState& state) {
       note += absl::StrFormat("  %s %d", reason, count);
     }
   }
-  return note.empty() ? "  no rejects" : note;
+  if (note.empty()) note = "  no rejects";
+  if (state.buffered > 0)
+    note += absl::StrFormat("  BUFFERED %d", state.buffered);
+  if (state.dropped > 0) note += absl::StrFormat("  DROPPED %d", state.dropped);
+  return note;
 }
 
 absl::StatusOr<std::unique_ptr<StreamSink>> StreamSink::Open(

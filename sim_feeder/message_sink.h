@@ -12,6 +12,7 @@
 #include <fstream>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 
 #include "absl/status/status.h"
@@ -26,13 +27,20 @@ namespace fathom::feeder {
 struct SinkState {
   client::IngestProgress pings;
   client::IngestProgress reports;
+  // With a buffer on disk: what it holds that the server is not known to have,
+  // and what found no room in it.
+  std::uint64_t buffered = 0;
+  std::uint64_t dropped = 0;
 };
 
 // What was refused, by reason (proto names without prefix).
 std::map<std::string, std::uint64_t> RejectCounts(
     const client::IngestProgress& progress);
+std::map<std::string, std::uint64_t> RejectCounts(
+    std::span<const v1::RejectCount> rejects);
 
-// The same of both for a progress bar: "  GATED 12  STALE 1" or "  no rejects".
+// The same of both for a progress bar: "  GATED 12  STALE 1" or "  no rejects",
+// and what the buffer holds.
 std::string RejectNote(const SinkState& state);
 
 class MessageSink {

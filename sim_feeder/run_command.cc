@@ -1,5 +1,6 @@
 #include "sim_feeder/run_command.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -19,6 +20,7 @@
 #include "client/proto_time.h"
 #include "sim_feeder/activity.h"
 #include "sim_feeder/angles.h"
+#include "sim_feeder/prepared_messages.h"
 #include "sim_feeder/progress_bar.h"
 
 namespace fathom::feeder {
@@ -34,6 +36,7 @@ void AddAcks(const SinkState& state, SurveyRecord& record) {
   record.pings_durable = state.pings.durable_sequence;
   record.reports_durable = state.reports.durable_sequence;
   record.measurements_accepted = state.pings.measurements_accepted;
+  record.dropped = state.dropped;
   record.reconnects = state.pings.reconnects + state.reports.reconnects;
   record.map_revision =
       std::max(state.pings.map_revision, state.reports.map_revision);
@@ -74,28 +77,73 @@ absl::StatusOr<SurveyArea> DecideArea(const RunOptions& options,
   return picked.area;
 }
 
-void PrintSummary(const SurveyRecord& record) {
+// Of all vehicles of a run.
+void PrintSummary(const std::vector<SurveyRecord>& records) {
+  SurveyRecord all;
+  std::size_t ships = 0;
+  for (const SurveyRecord& record : records) {
+    all.pings += record.pings;
+    all.measurements += record.measurements;
+    all.pings_silent += record.pings_silent;
+    all.contact_reports += record.contact_reports;
+    all.pings_durable += record.pings_durable;
+    all.reports_durable += record.reports_durable;
+    all.dropped += record.dropped;
+    all.seconds = std::max(all.seconds, record.seconds);
+    ships += record.ships.size();
+    for (const auto& [reason, count] : record.rejects) {
+      all.rejects[reason] += count;
+    }
+    for (const auto& [reason, count] : record.report_rejects) {
+      all.report_rejects[reason] += count;
+    }
+  }
+  if (records.size() > 1)
+    absl::FPrintF(stderr, "%d vehicles: ", records.size());
   absl::FPrintF(
       stderr,
       "sent %d pings (%d measurements, %d without return), %d reports on %d "
       "ships; durable %d pings, %d reports; %.2f s, %.0f pings/s\n",
-      record.pings, record.measurements, record.pings_silent,
-      record.contact_reports, record.ships.size(), record.pings_durable,
-      record.reports_durable, record.seconds,
-      record.seconds > 0.0 ? static_cast<double>(record.pings) / record.seconds
-                           : 0.0);
-  for (const auto& [reason, count] : record.rejects) {
+      all.pings, all.measurements, all.pings_silent, all.contact_reports, ships,
+      all.pings_durable, all.reports_durable, all.seconds,
+      all.seconds > 0.0 ? static_cast<double>(all.pings) / all.seconds : 0.0);
+  if (all.dropped > 0) {
+    absl::FPrintF(stderr, "dropped by a full buffer: %d messages\n",
+                  all.dropped);
+  }
+  for (const auto& [reason, count] : all.rejects) {
     absl::FPrintF(stderr, "measurements rejected: %s %d\n", reason, count);
   }
-  for (const auto& [reason, count] : record.report_rejects) {
+  for (const auto& [reason, count] : all.report_rejects) {
     absl::FPrintF(stderr, "reports rejected: %s %d\n", reason, count);
   }
 }
 
+// The number-th vehicle's own part of a run, counted from 1.
+RunOptions OptionsOf(const RunOptions& options, int number) {
+  RunOptions own = options;
+  if (options.vehicles == 1) return own;
+  const std::string suffix = absl::StrFormat("-%d", number);
+  own.link.source_id += suffix;
+  if (!own.link.buffer.empty()) own.link.buffer += "/" + own.link.source_id;
+  if (!own.vehicle_id.empty()) own.vehicle_id += suffix;
+  if (options.share_activity) {
+    // Opened before and completed after all of them.
+    own.start_activity = false;
+    own.complete_activity = false;
+  } else {
+    own.scenario.activity_id += suffix;
+  }
+  own.scenario.seed += static_cast<std::uint64_t>(number - 1);
+  // One bar on one terminal.
+  own.show_progress = options.show_progress && number == 1;
+  return own;
+}
+
+// REQUIRES: the area was decided, the seabed lies about it.
 absl::StatusOr<std::unique_ptr<Simulation>> PrepareSimulation(
-    const RunOptions& options, const TruthSource& truth) {
+    const RunOptions& options, std::shared_ptr<const LocalTerrain> seabed) {
   Scenario scenario = options.scenario;
-  FATHOM_ASSIGN_OR_RETURN(scenario.area, DecideArea(options, truth));
   if (options.duration_s.has_value()) {
     if (!(*options.duration_s > 0.0) || !(*options.duration_s < 1e9)) {
       return absl::InvalidArgumentError(absl::StrFormat(
@@ -104,10 +152,6 @@ absl::StatusOr<std::unique_ptr<Simulation>> PrepareSimulation(
     scenario.pings = static_cast<std::uint64_t>(
         std::ceil(*options.duration_s / scenario.ping_interval_s));
   }
-  FATHOM_RETURN_IF_ERROR(ValidateScenario(scenario));
-  FATHOM_ASSIGN_OR_RETURN(
-      std::shared_ptr<const LocalTerrain> seabed,
-      truth.SeabedAbout(scenario.area, scenario.sonar.fan.max_slant_range_m));
   const Time now =
       std::chrono::floor<std::chrono::seconds>(SystemClock().Now());
   scenario.start_time = options.start_time.value_or(now);
@@ -121,19 +165,115 @@ absl::StatusOr<std::unique_ptr<Simulation>> PrepareSimulation(
   return Simulation::Create(scenario, seabed);
 }
 
+SurveyRecord RecordOf(const RunOptions& options, const Simulation& simulation,
+                      const TruthSource& truth) {
+  const Scenario& scenario = simulation.scenario();
+  SurveyRecord record;
+  record.activity_id = scenario.activity_id;
+  record.source_id = options.link.source_id;
+  record.seed = scenario.seed;
+  record.truth = truth.Describe();
+  record.start_time = scenario.start_time;
+  record.end_time = simulation.TimeAt(simulation.duration_s());
+  record.area = scenario.area;
+  record.ships = simulation.ships();
+  record.track_length_m = simulation.vehicle().length_m();
+  record.track_spacing_m = simulation.track_spacing_m();
+  return record;
+}
+
+ActivityToOpen ActivityOf(const RunOptions& options, const Scenario& scenario) {
+  return {.id = scenario.activity_id,
+          .vehicle_id = options.vehicle_id,
+          .time = scenario.start_time,
+          .area = scenario.area,
+          .parameters = options.activity};
+}
+
+// One vehicle's messages into the server or the record files.
+absl::Status SendSurvey(const RunOptions& options, Simulation& simulation,
+                        SurveyRecord& record) {
+  std::ofstream track;
+  if (!options.track_out.empty()) {
+    track.open(options.track_out, std::ios::trunc);
+    track << "time,latitude_deg,longitude_deg,depth_m,heading_deg,"
+             "water_depth_m\n";
+    if (!track) {
+      return absl::PermissionDeniedError(
+          absl::StrFormat("cannot write to %s", options.track_out));
+    }
+  }
+  std::ostream* const track_stream = track.is_open() ? &track : nullptr;
+  if (options.link.server.empty()) {
+    FATHOM_ASSIGN_OR_RETURN(
+        const std::unique_ptr<RecordSink> sink,
+        RecordSink::Open(options.pings_out, options.reports_out,
+                         options.link.source_id));
+    return DriveSurvey(simulation, *sink, options.rate, options.show_progress,
+                       track_stream, record, options.prepare_mib << 20);
+  }
+  FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<client::Client> client,
+                          Connect(options.link, !options.link.buffer.empty() &&
+                                                    !options.start_activity));
+  if (options.start_activity) {
+    FATHOM_RETURN_IF_ERROR(
+        OpenActivity(*client, ActivityOf(options, simulation.scenario())));
+  }
+  FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<MessageSink> sink,
+                          OpenSink(*client, options.link, options.rate > 0.0));
+  FATHOM_RETURN_IF_ERROR(DriveSurvey(simulation, *sink, options.rate,
+                                     options.show_progress, track_stream,
+                                     record, options.prepare_mib << 20));
+  if (record.reconnects > 0 && options.start_activity) {
+    // Acks that a cut swallowed are counted nowhere else.
+    FATHOM_ASSIGN_OR_RETURN(const ActivityCounts counts,
+                            CountsOf(*client, record.activity_id));
+    record.measurements_accepted = counts.measurements_accepted;
+    record.rejects = counts.rejects;
+  }
+  if (options.complete_activity) {
+    return CompleteActivity(*client, record.activity_id);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ValidateRun(const RunOptions& options) {
+  if (!(options.rate >= 0.0) || !(options.rate <= 1e6)) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "rate=%g must be in [0, 1e6]; 0 is flat out", options.rate));
+  }
+  if (options.vehicles < 1 || options.vehicles > kMaxVehicles) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "vehicles=%d must be 1 to %d", options.vehicles, kMaxVehicles));
+  }
+  if (options.vehicles > 1 &&
+      !(options.pings_out.empty() && options.reports_out.empty() &&
+        options.track_out.empty())) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "vehicles=%d would write to one file; run them one by one",
+        options.vehicles));
+  }
+  if (options.prepare_mib > 0 && !options.track_out.empty()) {
+    return absl::InvalidArgumentError(
+        "a track is written as it is gone, not while messages are made ahead: "
+        "prepare_mib or track_out");
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 absl::Status DriveSurvey(Simulation& simulation, MessageSink& sink, double rate,
                          bool show_progress, std::ostream* track,
-                         SurveyRecord& record) {
+                         SurveyRecord& record, std::uint64_t prepare_bytes) {
+  PreparedMessages messages(simulation, prepare_bytes);
   ProgressBar bar(simulation.pings_planned(), "pings", show_progress);
   const SteadyClock::time_point start = SteadyClock::now();
-  while (const std::optional<Simulation::Message> message = simulation.Next()) {
+  while (const std::optional<Simulation::Message> message = messages.Next()) {
     if (rate > 0.0) {
       std::this_thread::sleep_until(
-          start +
-          std::chrono::duration_cast<SteadyClock::duration>(
-              std::chrono::duration<double>(simulation.now_s() / rate)));
+          start + std::chrono::duration_cast<SteadyClock::duration>(
+                      std::chrono::duration<double>(messages.now_s() / rate)));
     }
     if (v1::Ping* const* ping = std::get_if<v1::Ping*>(&*message)) {
       FATHOM_RETURN_IF_ERROR(sink.SendPing(**ping));
@@ -147,91 +287,77 @@ absl::Status DriveSurvey(Simulation& simulation, MessageSink& sink, double rate,
       ++record.contact_reports;
     }
     if (bar.Due()) {
-      bar.Update(simulation.pings_done(), RejectNote(sink.State()));
+      bar.Update(messages.pings_done(), RejectNote(sink.State()));
     }
   }
-  FATHOM_RETURN_IF_ERROR(sink.Finish());
+  // What was sent and dropped is told even if the end is not reached.
+  const absl::Status end = sink.Finish();
   record.seconds = SecondsSince(start);
   record.pings_silent = simulation.pings_silent();
   const SinkState state = sink.State();
   AddAcks(state, record);
-  bar.Finish(simulation.pings_done(), RejectNote(state));
-  return absl::OkStatus();
+  bar.Finish(messages.pings_done(), RejectNote(state));
+  return end;
 }
 
-absl::StatusOr<SurveyRecord> PerformSurvey(const RunOptions& options,
-                                           const TruthSource& truth) {
-  if (!(options.rate >= 0.0) || !(options.rate <= 1e6)) {
-    return absl::InvalidArgumentError(absl::StrFormat(
-        "rate=%g must be in [0, 1e6]; 0 is flat out", options.rate));
+absl::StatusOr<std::vector<SurveyRecord>> PerformSurveys(
+    const RunOptions& options, const TruthSource& truth) {
+  FATHOM_RETURN_IF_ERROR(ValidateRun(options));
+  RunOptions decided = options;
+  FATHOM_ASSIGN_OR_RETURN(decided.scenario.area, DecideArea(options, truth));
+  FATHOM_RETURN_IF_ERROR(ValidateScenario(decided.scenario));
+  FATHOM_ASSIGN_OR_RETURN(
+      const std::shared_ptr<const LocalTerrain> seabed,
+      truth.SeabedAbout(decided.scenario.area,
+                        decided.scenario.sonar.fan.max_slant_range_m));
+  std::vector<RunOptions> own;
+  std::vector<std::unique_ptr<Simulation>> simulations;
+  std::vector<SurveyRecord> records;
+  for (int number = 1; number <= options.vehicles; ++number) {
+    own.push_back(OptionsOf(decided, number));
+    FATHOM_ASSIGN_OR_RETURN(std::unique_ptr<Simulation> simulation,
+                            PrepareSimulation(own.back(), seabed));
+    records.push_back(RecordOf(own.back(), *simulation, truth));
+    simulations.push_back(std::move(simulation));
   }
-  FATHOM_ASSIGN_OR_RETURN(std::unique_ptr<Simulation> simulation,
-                          PrepareSimulation(options, truth));
-  const Scenario& scenario = simulation->scenario();
-  SurveyRecord record;
-  record.activity_id = scenario.activity_id;
-  record.source_id = options.source_id;
-  record.seed = scenario.seed;
-  record.truth = truth.Describe();
-  record.start_time = scenario.start_time;
-  record.end_time = simulation->TimeAt(simulation->duration_s());
-  record.area = scenario.area;
-  record.ships = simulation->ships();
-  record.track_length_m = simulation->vehicle().length_m();
-  record.track_spacing_m = simulation->track_spacing_m();
-
-  std::ofstream track;
-  if (!options.track_out.empty()) {
-    track.open(options.track_out, std::ios::trunc);
-    track << "time,latitude_deg,longitude_deg,depth_m,heading_deg,"
-             "water_depth_m\n";
-    if (!track) {
-      return absl::PermissionDeniedError(
-          absl::StrFormat("cannot write to %s", options.track_out));
-    }
-  }
-  std::ostream* const track_stream = track.is_open() ? &track : nullptr;
-  if (options.server.empty()) {
-    FATHOM_ASSIGN_OR_RETURN(
-        const std::unique_ptr<RecordSink> sink,
-        RecordSink::Open(options.pings_out, options.reports_out,
-                         options.source_id));
-    FATHOM_RETURN_IF_ERROR(DriveSurvey(*simulation, *sink, options.rate,
-                                       options.show_progress, track_stream,
-                                       record));
-  } else {
-    FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<client::Client> client,
-                            client::Client::Connect(options.server, {}));
+  std::unique_ptr<client::Client> client;
+  if (options.vehicles > 1 && options.share_activity &&
+      !options.link.server.empty()) {
+    FATHOM_ASSIGN_OR_RETURN(client, Connect(options.link));
     if (options.start_activity) {
-      FATHOM_RETURN_IF_ERROR(
-          OpenActivity(*client, {.id = scenario.activity_id,
-                                 .vehicle_id = options.vehicle_id,
-                                 .time = scenario.start_time,
-                                 .area = scenario.area,
-                                 .parameters = options.activity}));
-    }
-    client::IngestStreamOptions stream;
-    stream.source_id = options.source_id;
-    stream.epoch = options.epoch;
-    FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<StreamSink> sink,
-                            StreamSink::Open(*client, stream));
-    FATHOM_RETURN_IF_ERROR(DriveSurvey(*simulation, *sink, options.rate,
-                                       options.show_progress, track_stream,
-                                       record));
-    if (options.complete_activity) {
-      FATHOM_RETURN_IF_ERROR(CompleteActivity(*client, scenario.activity_id));
+      FATHOM_RETURN_IF_ERROR(OpenActivity(
+          *client, ActivityOf(decided, simulations.front()->scenario())));
     }
   }
-  PrintSummary(record);
-  return record;
+  std::vector<absl::Status> ends(own.size());
+  std::vector<std::thread> vehicles;
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    vehicles.emplace_back(
+        [&, i] { ends[i] = SendSurvey(own[i], *simulations[i], records[i]); });
+  }
+  for (std::thread& vehicle : vehicles) vehicle.join();
+  if (std::any_of(records.begin(), records.end(),
+                  [](const SurveyRecord& r) { return r.pings > 0; })) {
+    PrintSummary(records);
+  }
+  for (const absl::Status& end : ends) FATHOM_RETURN_IF_ERROR(end);
+  if (client != nullptr && options.complete_activity) {
+    FATHOM_RETURN_IF_ERROR(
+        CompleteActivity(*client, options.scenario.activity_id));
+  }
+  return records;
 }
 
 absl::Status RunSurvey(const RunOptions& options) {
   FATHOM_ASSIGN_OR_RETURN(const TruthSource truth,
                           TruthSource::Load(options.truth));
-  FATHOM_ASSIGN_OR_RETURN(const SurveyRecord record,
-                          PerformSurvey(options, truth));
-  if (options.json) absl::PrintF("%s\n", ToJson(record));
+  FATHOM_ASSIGN_OR_RETURN(const std::vector<SurveyRecord> records,
+                          PerformSurveys(options, truth));
+  if (options.json) {
+    for (const SurveyRecord& record : records) {
+      absl::PrintF("%s\n", ToJson(record));
+    }
+  }
   return absl::OkStatus();
 }
 

@@ -6,10 +6,12 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "fathom/v1/mission_service.pb.h"
+#include "sim_feeder/link.h"
 #include "sim_feeder/message_sink.h"
 #include "sim_feeder/scenario.h"
 #include "sim_feeder/simulation.h"
@@ -18,12 +20,12 @@
 
 namespace fathom::feeder {
 
+// Vehicles of one run: each has a thread and two streams.
+inline constexpr int kMaxVehicles = 100;
+
 struct RunOptions {
-  // Empty: no server (dry run; then a record file makes sense).
-  std::string server;
-  std::string source_id = "feeder";
-  // 0: the wall clock, which is larger than every epoch before.
-  std::uint64_t epoch = 0;
+  // Without a server a record file makes sense.
+  LinkOptions link;
 
   TruthOptions truth;
   // The area; or the side of a square to be found in the truth.
@@ -36,10 +38,18 @@ struct RunOptions {
   // Times real time; 0: flat out.
   double rate = 0.0;
 
+  // So much of the messages of each vehicle is made before the first is sent,
+  // MiB (prepared_messages.h); not with track_out.
+  std::uint64_t prepare_mib = 0;
+
   // Open the activity first. Its area, cell size and id are the scenario's.
   bool start_activity = true;
   v1::ActivityParameters activity;
   std::string vehicle_id;
+  // More than one: each has its own noise (seed, seed + 1, ...) and source
+  // (source_id-1, ...), its own activity (id-1, ...) unless they share one.
+  int vehicles = 1;
+  bool share_activity = false;
   // Complete it at the end (transfer to the global map).
   bool complete_activity = false;
 
@@ -50,23 +60,26 @@ struct RunOptions {
   bool json = false;
 };
 
-// Runs, and tells people the outcome on standard error. Errors: of the
-// scenario, the connection and the streams.
-absl::StatusOr<SurveyRecord> PerformSurvey(const RunOptions& options,
-                                           const TruthSource& truth);
+// Runs, and tells people the outcome on standard error: one summary of all
+// vehicles; their records in their order. Errors: of the scenario, the
+// connection and the streams (the first vehicle's that failed);
+// INVALID_ARGUMENT for several vehicles that would write to one file.
+absl::StatusOr<std::vector<SurveyRecord>> PerformSurveys(
+    const RunOptions& options, const TruthSource& truth);
 
 // Runs and prints: for people on standard error, with `json` the survey record
-// as one line on standard output.
+// of each vehicle as one line on standard output.
 //
 // Errors: of the truth, the scenario, the connection and the streams.
 absl::Status RunSurvey(const RunOptions& options);
 
 // The part without network or files: drives `simulation` into `sink` and adds
 // what was sent and acknowledged to `record`. `track` (may be null) gets CSV
-// lines of the vehicle's way, one per ping.
+// lines of the vehicle's way, one per ping. The first `prepare_bytes` of
+// messages are made before the clock starts (prepared_messages.h).
 absl::Status DriveSurvey(Simulation& simulation, MessageSink& sink, double rate,
                          bool show_progress, std::ostream* track,
-                         SurveyRecord& record);
+                         SurveyRecord& record, std::uint64_t prepare_bytes = 0);
 
 }  // namespace fathom::feeder
 

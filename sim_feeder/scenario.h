@@ -26,6 +26,9 @@ struct Scenario {
   Time start_time;
 
   VehicleOptions vehicle;
+  // Where it goes, one after the other, and again from the first on while the
+  // run lasts; empty: to and fro over the area, legs `track_spacing_m` apart.
+  std::vector<Waypoint> waypoints = {};
   // Between legs, metres; absent: 2 tan(60 deg) times the altitude over the
   // area's median water, so that neighbouring swaths (which reach to 75 deg)
   // overlap.
@@ -47,6 +50,8 @@ struct Scenario {
   double crossing_m = 120.0;
   // Besides these.
   std::vector<Ship> scripted_ships = {};
+  // Of these, those that chase the vehicle once their script is over.
+  std::vector<Pursuit> pursuits = {};
   // Bearing noise of the passive sonar, 1 sigma degrees, in (0, 45].
   double passive_bearing_std_deg = 1.5;
   // How far it hears, metres; 0: any distance, as in the thesis (3.6.1). On a

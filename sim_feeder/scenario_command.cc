@@ -18,24 +18,24 @@ namespace fathom::feeder {
 absl::Status RunScenario(const ScenarioOptions& options) {
   FATHOM_ASSIGN_OR_RETURN(ScenarioFile scenario, LoadScenario(options.path));
   RunOptions& run = scenario.run;
-  run.server = options.server;
-  run.source_id = options.source_id;
-  run.epoch = options.epoch;
+  run.link = options.link;
   run.rate = options.rate;
   run.show_progress = options.show_progress;
   if (options.seed.has_value()) run.scenario.seed = *options.seed;
   FATHOM_ASSIGN_OR_RETURN(const TruthSource truth,
                           TruthSource::Load(run.truth));
-  if (options.server.empty()) {
+  if (options.link.server.empty()) {
     absl::FPrintF(stderr, "%s: %s: the file is good\n", options.path,
                   scenario.title);
     return absl::OkStatus();
   }
-  FATHOM_ASSIGN_OR_RETURN(const SurveyRecord survey, PerformSurvey(run, truth));
+  FATHOM_ASSIGN_OR_RETURN(const std::vector<SurveyRecord> surveys,
+                          PerformSurveys(run, truth));
+  const SurveyRecord& survey = surveys.front();
   FATHOM_ASSIGN_OR_RETURN(const std::shared_ptr<const LocalTerrain> seabed,
                           truth.SeabedAbout(survey.area, kEvaluationMarginM));
   FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<client::Client> client,
-                          client::Client::Connect(options.server, {}));
+                          Connect(options.link));
   FATHOM_ASSIGN_OR_RETURN(
       const DepthEvaluation depth,
       EvaluateDepth(*client, *seabed, survey.area, survey.end_time,

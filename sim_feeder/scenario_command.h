@@ -9,15 +9,14 @@
 #include <string>
 
 #include "absl/status/status.h"
+#include "sim_feeder/link.h"
 
 namespace fathom::feeder {
 
 struct ScenarioOptions {
   std::string path;
-  // Empty: only check the file.
-  std::string server;
-  std::string source_id = "feeder";
-  std::uint64_t epoch = 0;
+  // Without a server: only check the file.
+  LinkOptions link;
   // In place of the file's.
   std::optional<std::uint64_t> seed;
   double rate = 0.0;

@@ -122,6 +122,22 @@ void ReadVehicle(YamlMap map, Scenario& scenario) {
   map.Read("depth_m", vehicle.depth_m, 0, 12'000);
   map.Read("track_spacing_m", scenario.track_spacing_m, 0.1, 100'000);
   map.Read("min_water_m", scenario.min_water_m, 0.1, 12'000);
+  for (YamlMap& point : map.Children("waypoints")) {
+    Waypoint waypoint;
+    point.Read("north_m", waypoint.place.north_m, -1e5, 1e5);
+    point.Read("east_m", waypoint.place.east_m, -1e5, 1e5);
+    point.Read("loiter_radius_m", waypoint.loiter_radius_m, 0.1, 1e5);
+    point.Read("loiter_s", waypoint.loiter_s, 0.1, 1e7);
+    if (point.Has("loiter_s") != point.Has("loiter_radius_m")) {
+      point.Refuse(point.Has("loiter_s") ? "loiter_s" : "loiter_radius_m",
+                   "needs loiter_radius_m and loiter_s both");
+    }
+    scenario.waypoints.push_back(waypoint);
+  }
+  if (map.Has("waypoints") && map.Has("track_spacing_m")) {
+    map.Refuse("track_spacing_m",
+               "is of a lawnmower, and waypoints are stated");
+  }
 }
 
 void ReadNavigation(YamlMap map, NavigationOptions& navigation) {
@@ -149,8 +165,9 @@ void ReadSonar(YamlMap map, Scenario& scenario) {
   map.Read("tide_m", faults.tide_m, -20, 20);
 }
 
-// One ship: where it starts, and its legs one after the other.
-Ship ReadShip(YamlMap& map) {
+// One ship: where it starts, its legs one after the other, and whether it
+// chases the vehicle after them.
+Ship ReadShip(YamlMap& map, std::vector<Pursuit>& pursuits) {
   Ship ship;
   std::size_t kind = 0;
   map.Read("id", ship.id);
@@ -185,6 +202,14 @@ Ship ReadShip(YamlMap& map) {
     at_s += duration_s;
   }
   if (ship.id.empty()) map.Refuse("id", "is missing");
+  Pursuit pursuit = {.ship_id = ship.id, .from_s = at_s};
+  map.Read("chase_speed_m_s", pursuit.speed_m_s, 0.01, 60);
+  map.Read("chase_interval_s", pursuit.interval_s, 0.1, 1e6);
+  if (map.Has("chase_speed_m_s")) {
+    pursuits.push_back(pursuit);
+  } else if (map.Has("chase_interval_s")) {
+    map.Refuse("chase_interval_s", "needs chase_speed_m_s");
+  }
   return ship;
 }
 
@@ -192,7 +217,7 @@ void ReadContacts(YamlMap map, Scenario& scenario) {
   map.Read("ships", scenario.ships, 0, 1000);
   map.Read("crossing_m", scenario.crossing_m, 0, 1e5);
   for (YamlMap& ship : map.Children("scripted")) {
-    scenario.scripted_ships.push_back(ReadShip(ship));
+    scenario.scripted_ships.push_back(ReadShip(ship, scenario.pursuits));
   }
   map.Read("bearing_std_deg", scenario.passive_bearing_std_deg, 1e-6, 45);
   map.Read("passive_range_m", scenario.passive_range_m, 0, kWholeEarthM);
@@ -237,6 +262,9 @@ absl::StatusOr<ScenarioFile> ParseScenario(const std::string& text,
   file.Read("duration_s", run.duration_s, 1, 1e7);
   file.Read("pings", run.scenario.pings);
   file.Read("evaluation_points", out.evaluation_points);
+  if (out.evaluation_points == 0) {
+    file.Refuse("evaluation_points", "must be at least 1");
+  }
   if (file.Has("duration_s") && file.Has("pings")) {
     file.Refuse("pings", "and duration_s are both stated");
   }

@@ -7,9 +7,6 @@
 namespace fathom::feeder {
 namespace {
 
-// 95 % point of chi-square with 2 degrees of freedom: -2 ln 0.05.
-constexpr double kChiSquare2At95 = 5.991464547107979;
-
 double Ratio(double sum, std::uint64_t count) {
   return count == 0 ? 0.0 : sum / static_cast<double>(count);
 }

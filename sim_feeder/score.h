@@ -76,6 +76,9 @@ struct PositionCovariance {
   double ee = 0.0;
 };
 
+// 95 % point of chi-square with 2 degrees of freedom: -2 ln 0.05.
+inline constexpr double kChiSquare2At95 = 5.991464547107979;
+
 // Normalised estimation error squared e' P^-1 e of a position: chi-square of 2
 // degrees of freedom for a consistent filter (mean 2, 95 % below 5.991).
 // Infinite when P is not positive definite.

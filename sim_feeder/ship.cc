@@ -1,5 +1,6 @@
 #include "sim_feeder/ship.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -71,6 +72,35 @@ Ship::Motion Ship::MotionAt(double seconds) const {
   }
   go_until(seconds);
   return motion;
+}
+
+void Chase(const Vehicle& vehicle, const Pursuit& pursuit, double until_s,
+           Ship& ship) {
+  const double interval_s = std::max(
+      pursuit.interval_s, (until_s - pursuit.from_s) / kMaxPursuitLooks);
+  PlanePoint place = ship.PlaceAt(pursuit.from_s);
+  for (int look = 0; pursuit.from_s + look * interval_s < until_s; ++look) {
+    const double at_s = pursuit.from_s + look * interval_s;
+    const VehicleState prey = vehicle.StateAt(at_s);
+    const double north_m = prey.north_m - place.north_m;
+    const double east_m = prey.east_m - place.east_m;
+    const double away_m = std::hypot(north_m, east_m);
+    // Per metre away: 0 where it is there already.
+    const double speed_per_m =
+        away_m > 0.0 ? std::min(pursuit.speed_m_s, away_m / interval_s) / away_m
+                     : 0.0;
+    const CourseChange change = {.at_s = at_s,
+                                 .north_m_s = north_m * speed_per_m,
+                                 .east_m_s = east_m * speed_per_m};
+    if (at_s <= 0.0) {
+      ship.north_m_s = change.north_m_s;
+      ship.east_m_s = change.east_m_s;
+    } else {
+      ship.changes.push_back(change);
+    }
+    place.north_m += change.north_m_s * interval_s;
+    place.east_m += change.east_m_s * interval_s;
+  }
 }
 
 std::vector<Ship> MakeShips(const LocalTerrain& terrain, const SurveyArea& area,

@@ -1,6 +1,6 @@
 // Moving obstacles: points with constant velocity, independent of the vehicle
-// (Nervegna 2002, section 3.6.1); or as a scenario scripts them: turns and
-// stops.
+// (Nervegna 2002, section 3.6.1); or as a scenario scripts them: turns,
+// stops, a chase.
 
 #ifndef FATHOM_SIM_FEEDER_SHIP_H_
 #define FATHOM_SIM_FEEDER_SHIP_H_
@@ -47,6 +47,26 @@ struct Ship {
   // That and how it moves there: O(changes).
   Motion MotionAt(double seconds) const;
 };
+
+// A ship that chases the vehicle: it heads for where the vehicle is, again and
+// again.
+struct Pursuit {
+  std::string ship_id = {};
+  // Since the start of the simulation, seconds: when its script is over.
+  double from_s = 0.0;
+  // Metres per second, > 0; less where it would run past the vehicle.
+  double speed_m_s = 5.0;
+  // Between two looks at where the vehicle is, seconds, > 0.
+  double interval_s = 10.0;
+};
+
+// Course changes at most that a pursuit is made of: a longer run looks less
+// often.
+inline constexpr double kMaxPursuitLooks = 10'000;
+
+// Gives `ship` the course changes of the pursuit until `until_s`.
+void Chase(const Vehicle& vehicle, const Pursuit& pursuit, double until_s,
+           Ship& ship);
 
 struct ShipOptions {
   // 0 to 1000.

@@ -99,31 +99,48 @@ Simulation::Simulation(const Scenario& scenario,
       fault_random_(scenario.seed, RandomStream::kSonarFaults),
       passive_random_(scenario.seed, RandomStream::kPassiveSonar) {}
 
-absl::Status Simulation::Plan() {
-  const std::optional<double> altitude_m =
-      MedianAltitudeM(*terrain_, scenario_);
-  if (!altitude_m.has_value()) {
-    return absl::NotFoundError(absl::StrFormat(
-        "the area has no water of min_water_m=%g on %s", scenario_.min_water_m,
-        terrain_->terrain().grid().name));
+absl::StatusOr<std::vector<Waypoint>> Simulation::PlanWay(int passes) {
+  std::vector<Waypoint> way;
+  if (!scenario_.waypoints.empty()) {
+    for (int pass = 0; pass < passes; ++pass) {
+      way.insert(way.end(), scenario_.waypoints.begin(),
+                 scenario_.waypoints.end());
+    }
+    return way;
   }
-  track_spacing_m_ = scenario_.track_spacing_m.value_or(
-      2.0 * std::tan(60.0 * kRadiansPerDegree) * *altitude_m);
-  TrackPlanOptions options = {.spacing_m = track_spacing_m_,
-                              .min_water_m = scenario_.min_water_m};
+  FATHOM_ASSIGN_OR_RETURN(const std::vector<PlanePoint> track,
+                          PlanTrack(*terrain_, scenario_.area,
+                                    {.spacing_m = track_spacing_m_,
+                                     .min_water_m = scenario_.min_water_m,
+                                     .passes = passes}));
+  for (const PlanePoint& corner : track) way.push_back({.place = corner});
+  return way;
+}
+
+absl::Status Simulation::Plan() {
+  if (scenario_.waypoints.empty()) {
+    const std::optional<double> altitude_m =
+        MedianAltitudeM(*terrain_, scenario_);
+    if (!altitude_m.has_value()) {
+      return absl::NotFoundError(absl::StrFormat(
+          "the area has no water of min_water_m=%g on %s",
+          scenario_.min_water_m, terrain_->terrain().grid().name));
+    }
+    track_spacing_m_ = scenario_.track_spacing_m.value_or(
+        2.0 * std::tan(60.0 * kRadiansPerDegree) * *altitude_m);
+  }
   const double wanted_s =
       static_cast<double>(scenario_.pings) * scenario_.ping_interval_s;
-  for (;;) {
-    FATHOM_ASSIGN_OR_RETURN(const std::vector<PlanePoint> track,
-                            PlanTrack(*terrain_, scenario_.area, options));
-    FATHOM_ASSIGN_OR_RETURN(
-        vehicle_, Vehicle::Create(*terrain_, track, scenario_.vehicle));
+  for (int passes = 1;;) {
+    FATHOM_ASSIGN_OR_RETURN(const std::vector<Waypoint> way, PlanWay(passes));
+    FATHOM_ASSIGN_OR_RETURN(vehicle_,
+                            Vehicle::Create(*terrain_, way, scenario_.vehicle));
     if (vehicle_->duration_s() >= wanted_s) break;
     const double times = wanted_s / vehicle_->duration_s();
-    const int passes = static_cast<int>(
-        std::min<double>(kMaxPasses + 1.0, std::ceil(times * options.passes)));
-    options.passes = std::max(options.passes + 1, passes);
-    if (options.passes > kMaxPasses) {
+    const int needed = static_cast<int>(
+        std::min<double>(kMaxPasses + 1.0, std::ceil(times * passes)));
+    passes = std::max(passes + 1, needed);
+    if (passes > kMaxPasses) {
       return absl::InvalidArgumentError(absl::StrFormat(
           "pings=%d would cover the area more than %d times; take fewer or a "
           "larger area",
@@ -143,6 +160,13 @@ absl::Status Simulation::Plan() {
                      ship_random);
   ships_.insert(ships_.end(), scenario_.scripted_ships.begin(),
                 scenario_.scripted_ships.end());
+  for (const Pursuit& pursuit : scenario_.pursuits) {
+    for (Ship& ship : ships_) {
+      if (ship.id == pursuit.ship_id) {
+        Chase(*vehicle_, pursuit, duration_s(), ship);
+      }
+    }
+  }
   for (std::size_t i = 0; i < ships_.size(); ++i) {
     // Ships take turns within an interval.
     const double turn =
@@ -210,6 +234,8 @@ void Simulation::FillPose(const VehicleState& state,
   pose.mutable_position()->set_latitude_deg(position.latitude_deg);
   pose.mutable_position()->set_longitude_deg(position.longitude_deg);
   pose.set_depth_m(state.depth_m);
+  pose.set_roll_deg(state.roll_rad * kDegreesPerRadian);
+  pose.set_pitch_deg(state.pitch_rad * kDegreesPerRadian);
   // The course is in the plane; a heading counts from the meridian.
   pose.set_heading_deg(WrapTo360(
       (state.course_rad - terrain_->frame().NorthAzimuthRad(position)) *

@@ -1,9 +1,9 @@
 // A vehicle's day at sea, as the messages that it sends.
 //
-// Pings come every ping_interval_s along a lawnmower; each ship is reported by
-// range and bearing in turn, and now and then fixed by C4I. Messages come in
-// order of time and carry no source, epoch or sequence: the stream that sends
-// them numbers them.
+// Pings come every ping_interval_s along a lawnmower or waypoints; each ship is
+// reported by range and bearing in turn, and now and then fixed by C4I.
+// Messages come in order of time and carry no source, epoch or sequence: the
+// stream that sends them numbers them.
 //
 // Deterministic: same scenario and terrain, same bytes. Not thread-safe.
 
@@ -72,6 +72,8 @@ class Simulation {
              std::shared_ptr<const LocalTerrain> terrain);
 
   absl::Status Plan();
+  // The way, `passes` times.
+  absl::StatusOr<std::vector<Waypoint>> PlanWay(int passes);
   void FillPose(const VehicleState& state, v1::VehiclePose& pose) const;
   bool FillPing(double seconds);
   bool FillRangeBearing(const Ship& ship, double seconds);

@@ -22,6 +22,7 @@ absl::Status ValidateSonarFaults(const SonarFaults& faults) {
 std::vector<SonarMeasurement> WithFaults(
     const SonarFaults& faults, double sonar_depth_m,
     std::vector<SonarMeasurement> measurements, Random& random) {
+  if (faults.none()) return measurements;
   const double stretch = 1.0 + faults.sound_speed_error;
   std::vector<SonarMeasurement> told;
   told.reserve(measurements.size());

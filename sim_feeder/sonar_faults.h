@@ -28,13 +28,18 @@ struct SonarFaults {
   // The water stands so far above the datum, metres, in [-20, 20], and depths
   // are told as if it did not.
   double tide_m = 0.0;
+
+  // Whether the sonar tells what it measured.
+  bool none() const { return *this == SonarFaults{}; }
+  bool operator==(const SonarFaults&) const = default;
 };
 
 // Errors: INVALID_ARGUMENT naming the option and its range.
 absl::Status ValidateSonarFaults(const SonarFaults& faults);
 
 // Of what a sonar at `sonar_depth_m` measured, what it tells. Draws as many
-// numbers for each measurement whatever the shares are. REQUIRES: valid.
+// numbers for each measurement whatever the shares are (none without any
+// fault). REQUIRES: valid.
 std::vector<SonarMeasurement> WithFaults(
     const SonarFaults& faults, double sonar_depth_m,
     std::vector<SonarMeasurement> measurements, Random& random);

@@ -112,6 +112,7 @@ absl::StatusOr<SurveyRecord> RecordFrom(const Json& json) {
       json.at("rejects").get<std::map<std::string, std::uint64_t>>();
   record.report_rejects =
       json.at("report_rejects").get<std::map<std::string, std::uint64_t>>();
+  record.dropped = json.value("dropped", std::uint64_t{0});
   record.reconnects = json.at("reconnects");
   record.map_revision = json.at("map_revision");
   record.seconds = json.at("seconds");
@@ -143,6 +144,7 @@ std::string ToJson(const SurveyRecord& record) {
       {"measurements_accepted", record.measurements_accepted},
       {"rejects", record.rejects},
       {"report_rejects", record.report_rejects},
+      {"dropped", record.dropped},
       {"reconnects", record.reconnects},
       {"map_revision", record.map_revision},
       {"seconds", record.seconds},

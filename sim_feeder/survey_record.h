@@ -46,6 +46,8 @@ struct SurveyRecord {
   std::uint64_t measurements_accepted = 0;
   std::map<std::string, std::uint64_t> rejects;
   std::map<std::string, std::uint64_t> report_rejects;
+  // Messages that found no room in the buffer while the link was down.
+  std::uint64_t dropped = 0;
   std::uint64_t reconnects = 0;
   std::uint64_t map_revision = 0;
   // From the first message sent to the last one durable, seconds.

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
+#include <optional>
 
 #include "absl/status/status.h"
 #include "absl/strings/str_format.h"
@@ -16,6 +18,8 @@ namespace {
 // 20 000 km at 2 m: 10 M depths, 80 MB.
 constexpr double kMaxTrackM = 2.0e7;
 constexpr double kDepthStepM = 2.0;
+// Standard gravity (ISO 80000-3).
+constexpr double kGravityM_s2 = 9.80665;
 
 absl::Status ValidateVehicle(const VehicleOptions& options) {
   return CheckRanges({{"speed_m_s", options.speed_m_s, 1e-3, 60.0},
@@ -26,50 +30,55 @@ absl::Status ValidateVehicle(const VehicleOptions& options) {
                       {"max_pitch_deg", options.max_pitch_deg, 0.1, 89.0}});
 }
 
+absl::Status ValidateLoiter(const Waypoint& at, const VehicleOptions& options) {
+  FATHOM_RETURN_IF_ERROR(
+      CheckRanges({{"loiter_s", at.loiter_s, 0.0, 1e7},
+                   {"loiter_radius_m", at.loiter_radius_m, 0.0, 1e5}}));
+  const double least_m =
+      options.speed_m_s / (options.turn_rate_deg_s * kRadiansPerDegree);
+  if (at.loiter_s > 0.0 && at.loiter_radius_m < least_m) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "loiter_radius_m=%g is less than the %.2f m that speed_m_s=%g and "
+        "turn_rate_deg_s=%g allow",
+        at.loiter_radius_m, least_m, options.speed_m_s,
+        options.turn_rate_deg_s));
+  }
+  return absl::OkStatus();
+}
+
+// Course from one place to another, radians; nullopt: they are one place.
+std::optional<double> CourseOf(const PlanePoint& from, const PlanePoint& to) {
+  const double north_m = to.north_m - from.north_m;
+  const double east_m = to.east_m - from.east_m;
+  if (north_m == 0.0 && east_m == 0.0) return std::nullopt;
+  return std::atan2(east_m, north_m);
+}
+
 }  // namespace
 
 absl::StatusOr<Vehicle> Vehicle::Create(const LocalTerrain& terrain,
-                                        const std::vector<PlanePoint>& track,
+                                        const std::vector<Waypoint>& track,
                                         const VehicleOptions& options) {
   FATHOM_RETURN_IF_ERROR(ValidateVehicle(options));
-  if (track.size() < 2) {
-    return absl::InvalidArgumentError(absl::StrFormat(
-        "a track needs two points, this one has %d", track.size()));
-  }
+  if (track.empty()) return absl::InvalidArgumentError("the track is empty");
   Vehicle vehicle;
-  double now_s = 0.0;
-  double course_rad = 0.0;
-  for (std::size_t i = 0; i + 1 < track.size(); ++i) {
-    const double north_m = track[i + 1].north_m - track[i].north_m;
-    const double east_m = track[i + 1].east_m - track[i].east_m;
-    const double length_m = std::hypot(north_m, east_m);
-    const double leg_course_rad = std::atan2(east_m, north_m);
-    const double turn_rad = WrapToPi(leg_course_rad - course_rad);
-    if (i > 0 && turn_rad != 0.0) {
-      const double turn_s =
-          std::abs(turn_rad) * kDegreesPerRadian / options.turn_rate_deg_s;
-      vehicle.pieces_.push_back({.begin_s = now_s,
-                                 .end_s = now_s + turn_s,
-                                 .from = track[i],
-                                 .to = track[i],
-                                 .begin_course_rad = course_rad,
-                                 .turn_rad = turn_rad,
-                                 .along_m = vehicle.length_m_,
-                                 .length_m = 0.0});
-      now_s += turn_s;
+  const PlanePoint& first = track.front().place;
+  for (std::size_t i = 0; i < track.size(); ++i) {
+    FATHOM_RETURN_IF_ERROR(ValidateLoiter(track[i], options));
+    const PlanePoint& from = i == 0 ? first : track[i - 1].place;
+    // A loiter at the start is entered on the course of the first leg.
+    if (i == 0 && track.size() > 1) {
+      vehicle.course_rad_ = CourseOf(from, track[1].place).value_or(0.0);
+    } else if (const std::optional<double> course_rad =
+                   CourseOf(from, track[i].place)) {
+      vehicle.AddTurn(from, *course_rad, options);
+      vehicle.AddLeg(from, track[i].place, options);
     }
-    course_rad = leg_course_rad;
-    const double leg_s = length_m / options.speed_m_s;
-    vehicle.pieces_.push_back({.begin_s = now_s,
-                               .end_s = now_s + leg_s,
-                               .from = track[i],
-                               .to = track[i + 1],
-                               .begin_course_rad = course_rad,
-                               .turn_rad = 0.0,
-                               .along_m = vehicle.length_m_,
-                               .length_m = length_m});
-    now_s += leg_s;
-    vehicle.length_m_ += length_m;
+    vehicle.AddLoiter(track[i], options);
+  }
+  if (vehicle.pieces_.empty()) {
+    return absl::InvalidArgumentError(
+        "a track needs two places, or one to loiter at");
   }
   if (vehicle.length_m_ > kMaxTrackM) {
     return absl::ResourceExhaustedError(
@@ -78,6 +87,70 @@ absl::StatusOr<Vehicle> Vehicle::Create(const LocalTerrain& terrain,
   }
   FATHOM_RETURN_IF_ERROR(vehicle.PlanDepth(terrain, options));
   return vehicle;
+}
+
+void Vehicle::AddTurn(const PlanePoint& at, double to_course_rad,
+                      const VehicleOptions& options) {
+  const double turn_rad = WrapToPi(to_course_rad - course_rad_);
+  const double begin_rad = course_rad_;
+  course_rad_ = to_course_rad;
+  if (turn_rad == 0.0) return;
+  const double turn_s =
+      std::abs(turn_rad) * kDegreesPerRadian / options.turn_rate_deg_s;
+  pieces_.push_back({.begin_s = EndS(),
+                     .end_s = EndS() + turn_s,
+                     .from = at,
+                     .to = at,
+                     .begin_course_rad = begin_rad,
+                     .turn_rad = turn_rad,
+                     .along_m = length_m_,
+                     .length_m = 0.0});
+}
+
+void Vehicle::AddLeg(const PlanePoint& from, const PlanePoint& to,
+                     const VehicleOptions& options) {
+  const double length_m =
+      std::hypot(to.north_m - from.north_m, to.east_m - from.east_m);
+  pieces_.push_back({.begin_s = EndS(),
+                     .end_s = EndS() + length_m / options.speed_m_s,
+                     .from = from,
+                     .to = to,
+                     .begin_course_rad = course_rad_,
+                     .turn_rad = 0.0,
+                     .along_m = length_m_,
+                     .length_m = length_m});
+  length_m_ += length_m;
+}
+
+void Vehicle::AddLoiter(const Waypoint& at, const VehicleOptions& options) {
+  if (at.loiter_s <= 0.0) return;
+  const double around_m = 2.0 * std::numbers::pi * at.loiter_radius_m;
+  const double circles = std::ceil(at.loiter_s * options.speed_m_s / around_m);
+  const double length_m = circles * around_m;
+  pieces_.push_back({.begin_s = EndS(),
+                     .end_s = EndS() + length_m / options.speed_m_s,
+                     .from = at.place,
+                     .to = at.place,
+                     .begin_course_rad = course_rad_,
+                     .turn_rad = circles * 2.0 * std::numbers::pi,
+                     .along_m = length_m_,
+                     .length_m = length_m,
+                     .radius_m = at.loiter_radius_m});
+  length_m_ += length_m;
+}
+
+PlanePoint Vehicle::Piece::PlaceAt(double part) const {
+  if (radius_m <= 0.0) {
+    return {.north_m = std::lerp(from.north_m, to.north_m, part),
+            .east_m = std::lerp(from.east_m, to.east_m, part)};
+  }
+  // The centre lies to starboard of the course c, along (-sin c, cos c); on
+  // course d the vehicle is to port of the centre.
+  const double course_rad = begin_course_rad + part * turn_rad;
+  return {.north_m = from.north_m + radius_m * (std::sin(course_rad) -
+                                                std::sin(begin_course_rad)),
+          .east_m = from.east_m - radius_m * (std::cos(course_rad) -
+                                              std::cos(begin_course_rad))};
 }
 
 // The wished depth along the track, then lifted so that no climb is steeper
@@ -123,10 +196,8 @@ PlanePoint Vehicle::PlaceAt(double along_m) const {
       [](double value, const Piece& piece) { return value < piece.along_m; });
   const Piece& piece = after == pieces_.begin() ? *after : *std::prev(after);
   if (piece.length_m <= 0.0) return piece.from;
-  const double part =
-      std::clamp((along_m - piece.along_m) / piece.length_m, 0.0, 1.0);
-  return {.north_m = std::lerp(piece.from.north_m, piece.to.north_m, part),
-          .east_m = std::lerp(piece.from.east_m, piece.to.east_m, part)};
+  return piece.PlaceAt(
+      std::clamp((along_m - piece.along_m) / piece.length_m, 0.0, 1.0));
 }
 
 double Vehicle::DepthAlong(double along_m) const {
@@ -136,6 +207,13 @@ double Vehicle::DepthAlong(double along_m) const {
   const std::size_t next = std::min(i + 1, depth_m_.size() - 1);
   return std::lerp(depth_m_[i], depth_m_[next],
                    std::min(1.0, place - static_cast<double>(i)));
+}
+
+double Vehicle::SlopeAlong(double along_m) const {
+  const std::size_t i = std::min(
+      static_cast<std::size_t>(along_m / depth_step_m_), depth_m_.size() - 1);
+  const std::size_t next = std::min(i + 1, depth_m_.size() - 1);
+  return (depth_m_[next] - depth_m_[i]) / depth_step_m_;
 }
 
 VehicleState Vehicle::StateAt(double seconds) const {
@@ -148,11 +226,19 @@ VehicleState Vehicle::StateAt(double seconds) const {
   const double part =
       span_s > 0.0 ? std::clamp((now_s - piece.begin_s) / span_s, 0.0, 1.0)
                    : 1.0;
+  const PlanePoint place = piece.PlaceAt(part);
+  const double along_m = piece.along_m + part * piece.length_m;
+  const double speed_m_s = span_s > 0.0 ? piece.length_m / span_s : 0.0;
   return {
-      .north_m = std::lerp(piece.from.north_m, piece.to.north_m, part),
-      .east_m = std::lerp(piece.from.east_m, piece.to.east_m, part),
-      .depth_m = DepthAlong(piece.along_m + part * piece.length_m),
-      .course_rad = WrapToPi(piece.begin_course_rad + part * piece.turn_rad)};
+      .north_m = place.north_m,
+      .east_m = place.east_m,
+      .depth_m = DepthAlong(along_m),
+      .course_rad = WrapToPi(piece.begin_course_rad + part * piece.turn_rad),
+      .roll_rad = piece.radius_m > 0.0
+                      ? std::atan(speed_m_s * speed_m_s /
+                                  (kGravityM_s2 * piece.radius_m))
+                      : 0.0,
+      .pitch_rad = speed_m_s > 0.0 ? -std::atan(SlopeAlong(along_m)) : 0.0};
 }
 
 }  // namespace fathom::feeder

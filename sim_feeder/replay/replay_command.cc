@@ -207,7 +207,7 @@ std::string ToJson(const ReplayOptions& options, const ReplayContents& contents,
   nlohmann::ordered_json json = {
       {"files", options.paths},
       {"activity_id", options.activity_id},
-      {"source_id", options.source_id},
+      {"source_id", options.link.source_id},
       {"start_time", FormatTime(*contents.first)},
       {"end_time", FormatTime(*contents.last)},
       {"soundings", contents.soundings},
@@ -233,6 +233,12 @@ std::string ToJson(const ReplayOptions& options, const ReplayContents& contents,
                     {"cell_size_m", area.cell_size_m}};
   }
   return json.dump();
+}
+
+// Whether nothing asks the server before the messages, which can wait.
+bool MayBeAway(const ReplayOptions& options, const ReplayContents& contents) {
+  return !options.link.buffer.empty() &&
+         !(contents.pings > 0 && options.start_activity);
 }
 
 absl::Status ReplayInto(const ReplayOptions& options,
@@ -335,15 +341,15 @@ absl::Status Replay(const ReplayOptions& options) {
             ? "; state --start-time, for it tells no time or no date"
             : ""));
   }
-  if (options.server.empty()) {
+  if (options.link.server.empty()) {
     FATHOM_ASSIGN_OR_RETURN(
         const std::unique_ptr<RecordSink> sink,
         RecordSink::Open(options.pings_out, options.reports_out,
-                         options.source_id));
+                         options.link.source_id));
     return ReplayInto(options, contents, *sink);
   }
   FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<client::Client> client,
-                          client::Client::Connect(options.server, {}));
+                          Connect(options.link, MayBeAway(options, contents)));
   const bool opens = contents.pings > 0 && options.start_activity;
   if (opens) {
     FATHOM_RETURN_IF_ERROR(
@@ -353,10 +359,8 @@ absl::Status Replay(const ReplayOptions& options) {
                                .area = *contents.area,
                                .parameters = options.activity}));
   }
-  FATHOM_ASSIGN_OR_RETURN(
-      const std::unique_ptr<StreamSink> sink,
-      StreamSink::Open(
-          *client, {.source_id = options.source_id, .epoch = options.epoch}));
+  FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<MessageSink> sink,
+                          OpenSink(*client, options.link, options.rate > 0.0));
   FATHOM_RETURN_IF_ERROR(ReplayInto(options, contents, *sink));
   if (contents.pings > 0 && options.complete_activity) {
     return CompleteActivity(*client, options.activity_id);

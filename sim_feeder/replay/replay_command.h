@@ -12,6 +12,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "fathom/v1/mission_service.pb.h"
+#include "sim_feeder/link.h"
 #include "sim_feeder/message_sink.h"
 #include "sim_feeder/replay/recording.h"
 #include "sim_feeder/survey_area.h"
@@ -23,10 +24,8 @@ struct ReplayOptions {
   std::vector<std::string> paths = {};
   RecordingOptions recording = {};
 
-  // Empty: no server (a dry run, to see what is in the files).
-  std::string server = {};
-  std::string source_id = "replay";
-  std::uint64_t epoch = 0;  // 0: the wall clock.
+  // Without a server: a dry run, to see what is in the files.
+  LinkOptions link = {.source_id = "replay"};
   // Times the recorded pace; 0: flat out.
   double rate = 0;
   // Recorded times are shifted so that the first event is now. Needs a rate

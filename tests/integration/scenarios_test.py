@@ -49,7 +49,25 @@ class Scenarios(LiveTest):
 
     def test_thesis_contact(self):
         with self.server() as server:
-            self.scenario("thesis_contact", server.address)
+            out = self.folder / "evaluation"
+            result = self.scenario("thesis_contact", server.address, "--out",
+                                   out)
+            with open(out / "tracks.csv", encoding="utf-8") as file:
+                rows = list(csv.DictReader(file))
+            contacts = result["evaluation"]["contacts"]
+            self.assertEqual(len(rows), contacts["count"])
+            # The figures are those of the rows.
+            self.assertAlmostEqual(
+                math.fsum(float(row["nees"]) for row in rows) / len(rows),
+                contacts["nees"], 3)
+            squares = [(float(row["north_m"]) - float(row["truth_north_m"]))**2
+                       + (float(row["east_m"]) - float(row["truth_east_m"]))**2
+                       for row in rows]
+            self.assertAlmostEqual(
+                math.sqrt(math.fsum(squares) / len(rows)), contacts["rmse_m"],
+                1)
+            picture = (out / "tracks.png").read_bytes()
+            self.assertEqual(struct.unpack(">II", picture[16:24]), (800, 860))
 
     def test_harbour_survey(self):
         with self.server() as server:
@@ -92,6 +110,9 @@ class Scenarios(LiveTest):
             self.assertGreaterEqual(proxy.made, 10)
             self.assertEqual(server.status(digest=True).map_digest, digest)
             self.assertEqual(cut["evaluation"], whole["evaluation"])
+            # Acks that a cut swallowed are counted all the same.
+            for key in ("measurements_accepted", "rejects"):
+                self.assertEqual(cut["survey"][key], whole["survey"][key])
 
     def test_a_seed_repeats_a_run_byte_for_byte(self):
         digests = []

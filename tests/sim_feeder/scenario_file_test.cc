@@ -128,6 +128,54 @@ TEST(ParseScenario, LegsOfAShipFollowEachOther) {
   EXPECT_EQ(ferry.MotionAt(80).east_m_s, 0);
 }
 
+TEST(ParseScenario, AWayOfItsOwn) {
+  const std::string way =
+      std::string(kGood) +
+      "vehicle:\n"                                                   // 11
+      "  waypoints:\n"                                               // 12
+      "    - {north_m: 10, east_m: 20}\n"                            // 13
+      "    - {north_m: 300, loiter_radius_m: 30, loiter_s: 120}\n";  // 14
+  FATHOM_ASSERT_OK_AND_ASSIGN(const ScenarioFile file,
+                              ParseScenario(way, "day.yaml"));
+  const std::vector<Waypoint>& waypoints = file.run.scenario.waypoints;
+  ASSERT_EQ(waypoints.size(), 2U);
+  EXPECT_EQ(waypoints[0].place.east_m, 20);
+  EXPECT_EQ(waypoints[0].loiter_s, 0);
+  EXPECT_EQ(waypoints[1].place.north_m, 300);
+  EXPECT_EQ(waypoints[1].loiter_radius_m, 30);
+  EXPECT_EQ(waypoints[1].loiter_s, 120);
+  EXPECT_THAT(MessageOf(way + "    - {north: 5}\n"),
+              HasSubstr("day.yaml:15: unknown key vehicle.waypoints[2].north; "
+                        "known here: east_m, "));
+  EXPECT_THAT(MessageOf(way + "    - {loiter_s: 5}\n"),
+              HasSubstr("day.yaml:15: vehicle.waypoints[2].loiter_s needs "
+                        "loiter_radius_m and loiter_s both"));
+  EXPECT_THAT(MessageOf(way + "  track_spacing_m: 30\n"),
+              HasSubstr("day.yaml:15: vehicle.track_spacing_m is of a "
+                        "lawnmower"));
+}
+
+TEST(ParseScenario, AShipThatChasesTheVehicle) {
+  const std::string ship = std::string(kGood) +
+                           "contacts:\n"
+                           "  scripted:\n"
+                           "    - id: hunter\n"
+                           "      legs:\n"
+                           "        - {speed_m_s: 5, duration_s: 60}\n";
+  FATHOM_ASSERT_OK_AND_ASSIGN(
+      const ScenarioFile file,
+      ParseScenario(ship + "      chase_speed_m_s: 7\n", "day.yaml"));
+  ASSERT_EQ(file.run.scenario.pursuits.size(), 1U);
+  const Pursuit& pursuit = file.run.scenario.pursuits[0];
+  EXPECT_EQ(pursuit.ship_id, "hunter");
+  EXPECT_EQ(pursuit.from_s, 60);
+  EXPECT_EQ(pursuit.speed_m_s, 7);
+  EXPECT_EQ(pursuit.interval_s, 10);
+  EXPECT_THAT(MessageOf(ship + "      chase_interval_s: 7\n"),
+              HasSubstr("day.yaml:16: contacts.scripted[0].chase_interval_s "
+                        "needs chase_speed_m_s"));
+}
+
 TEST(LoadScenario, TheShippedOnesAreGood) {
   int files = 0;
   for (const auto& entry : std::filesystem::directory_iterator(

@@ -61,6 +61,27 @@ TEST(Simulation, SameSeedGivesTheSameBytes) {
   EXPECT_EQ(first.reports, second.reports);
 }
 
+TEST(Simulation, WaypointsAreGoneRoundWhileTheRunLasts) {
+  Scenario scenario = SmallScenario();
+  // 100 m out and 100 m back at 2 m/s, and two turns of 12 s: 124 s a round.
+  scenario.waypoints = {{.place = {50, 50}}, {.place = {150, 50}}};
+  scenario.ships = 0;
+  scenario.scripted_ships = {{.id = "hunter", .start = {.east_m = -300}}};
+  scenario.pursuits = {{.ship_id = "hunter", .speed_m_s = 6}};
+  const auto simulation = *Simulation::Create(scenario, MakePlaneSeabed(Rough));
+  EXPECT_GE(simulation->vehicle().duration_s(), 299.0);
+  EXPECT_NEAR(simulation->vehicle().StateAt(50).north_m, 150.0, 1e-9);
+  EXPECT_NEAR(simulation->vehicle().StateAt(112).north_m, 50.0, 1e-9);
+  EXPECT_NEAR(simulation->vehicle().StateAt(174).north_m, 150.0, 1e-9);
+  // The ship has caught up in 5 minutes; it lies where the vehicle was at its
+  // last look but one at most: 20 s and 40 m.
+  const PlanePoint ship = simulation->ships()[0].PlaceAt(250);
+  const VehicleState vehicle = simulation->vehicle().StateAt(250);
+  EXPECT_LE(
+      std::hypot(ship.north_m - vehicle.north_m, ship.east_m - vehicle.east_m),
+      40.0);
+}
+
 TEST(Simulation, OtherSeedGivesOtherBytes) {
   Scenario other = SmallScenario();
   other.seed = 43;
