@@ -84,6 +84,13 @@ int CheckLimits(const nlohmann::json& report) {
   }
   missed += rocks.Report();
 
+  // "99.9 % confidence".
+  Limit row_error("thesis fig. 6-1: percent of cells beyond 3 std", 0.1);
+  for (const auto& row : rows("thesis_local")) {
+    row_error.Offer(100 - row["within_3std_percent"].get<double>(), Where(row));
+  }
+  missed += row_error.Report();
+
   Limit leaves("thesis scene 6.1.2: median leaves", 560);
   Limit bytes("thesis scene: bytes of the global map, median", 10'000);
   Limit drift("thesis scene: drift of a fine mean, m", 0.5001);

@@ -10,8 +10,8 @@ namespace fathom::accuracy {
 
 struct ChartSeries {
   std::string name;
-  std::vector<double> values;  // As many as the chart's x.
-  bool points = false;         // Dots instead of a line.
+  std::vector<double> values = {};  // As many as the chart's x.
+  bool points = false;              // Dots instead of a line.
   double red = 0;
   double green = 0;
   double blue = 0;
@@ -21,8 +21,8 @@ struct LineChart {
   std::string title;
   std::string x_label;
   std::string y_label;
-  std::vector<double> x;
-  std::vector<ChartSeries> series;
+  std::vector<double> x = {};
+  std::vector<ChartSeries> series = {};
 };
 
 // 560 x 340 pixels. False if it cannot be written.

@@ -13,6 +13,7 @@
 #include "tests/accuracy/contacts.h"
 #include "tests/accuracy/figures.h"
 #include "tests/accuracy/limits.h"
+#include "tests/accuracy/thesis_local.h"
 #include "tests/accuracy/thesis_scene.h"
 
 namespace fathom::accuracy {
@@ -95,7 +96,7 @@ int Run(int argc, char** argv) {
       ->check(CLI::Range(1, 1000));
   app.add_option("--only", only, "the figures whose names begin so");
   app.add_flag("--check", check, "exit 1 if a figure misses its limit");
-  app.add_option("--draw", draw, "folder for the pictures of figs. 6-2 to 6-13")
+  app.add_option("--draw", draw, "folder for the pictures of docs/results.md")
       ->check(CLI::ExistingDirectory);
   CLI11_PARSE(app, argc, argv);
 
@@ -113,6 +114,12 @@ int Run(int argc, char** argv) {
                                   seeds);
            }},
           {"hazard_cost", [&] { return HazardCostFigures(scenes, seeds); }},
+          {"thesis_local",
+           [&] {
+             return scenes.front().name == "coast"
+                        ? ThesisLocalFigures(scenes.front().terrain, seeds)
+                        : nlohmann::json::array();
+           }},
           {"thesis_scene",
            [&] {
              // The first scene is Woods Hole where it lies.
@@ -141,7 +148,13 @@ int Run(int argc, char** argv) {
       std::filesystem::absolute(out).parent_path());
   std::ofstream(out) << report.dump(2) << "\n";
   if (!draw.empty()) {
-    std::printf("\n%d pictures in %s\n", DrawThesisContact(draw), draw.c_str());
+    int pictures = DrawThesisContact(draw);
+    if (scenes.front().name == "coast") {
+      const Terrain& coast = scenes.front().terrain;
+      pictures += DrawThesisLocal(coast, draw + "/fig_6_1.png");
+      pictures += DrawThesisScene(coast, draw + "/global_scene.png");
+    }
+    std::printf("\n%d pictures in %s\n", pictures, draw.c_str());
   }
   const int missed = CheckLimits(report) + CheckContactLimits(report);
   return check && missed > 0 ? 1 : 0;

@@ -3,11 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <random>
 #include <utility>
 #include <vector>
 
+#include "absl/strings/str_format.h"
+#include "client/cli/canvas.h"
+#include "client/cli/colormap.h"
 #include "map/geodesy/ned_frame.h"
 #include "map/global/global_map.h"
 
@@ -69,19 +73,25 @@ struct Outcome {
   double worst_m = 0;
 };
 
-// Transfers the window and conglomerates it.
-template <typename DepthOf>
-Outcome Run(const map::RootSquare& root, const map::NedFrame& frame,
-            Corner corner, map::MergeRule rule, DepthOf depth_of) {
+// The window's corners: south-west, north-west, north-east, south-east.
+std::array<map::GeodeticPoint, 4> CornersOf(const map::NedFrame& frame,
+                                            Corner corner) {
   const double south_m = corner.first * kCellM;
   const double west_m = corner.second * kCellM;
   const double north_m = south_m + kSide * kCellM;
   const double east_m = west_m + kSide * kCellM;
+  return {frame.ToGeodetic(south_m, west_m), frame.ToGeodetic(north_m, west_m),
+          frame.ToGeodetic(north_m, east_m), frame.ToGeodetic(south_m, east_m)};
+}
+
+// The window as it is transferred, before any leaves are merged.
+template <typename DepthOf>
+map::GlobalMap Transferred(const map::RootSquare& root,
+                           const map::NedFrame& frame, Corner corner,
+                           DepthOf depth_of) {
   map::GlobalMap map({.root = root, .tolerance_m = kToleranceM});
   map.MergeArea(
-      {frame.ToGeodetic(south_m, west_m), frame.ToGeodetic(north_m, west_m),
-       frame.ToGeodetic(north_m, east_m), frame.ToGeodetic(south_m, east_m)},
-      kCellM,
+      CornersOf(frame, corner), kCellM,
       [&](const map::GeodeticPoint& point)
           -> std::optional<map::DepthEstimate> {
         const map::NedPoint ned = frame.ToNed(point);
@@ -97,6 +107,14 @@ Outcome Run(const map::RootSquare& root, const map::NedFrame& frame,
             .kind = map::EvidenceKind::kMeasured,
             .time_s = static_cast<std::uint32_t>(1'000'000 + kSide * j + i)};
       });
+  return map;
+}
+
+// Transfers the window and conglomerates it.
+template <typename DepthOf>
+Outcome Run(const map::RootSquare& root, const map::NedFrame& frame,
+            Corner corner, map::MergeRule rule, DepthOf depth_of) {
+  map::GlobalMap map = Transferred(root, frame, corner, depth_of);
   const map::GlobalMapView fine = map.View();
   map.Conglomerate(rule);
   const map::GlobalMapView view = map.View();
@@ -110,11 +128,72 @@ Outcome Run(const map::RootSquare& root, const map::NedFrame& frame,
   return outcome;
 }
 
+map::RootSquare ThesisRoot() {
+  return map::RootSquare::CenteredOn(kSouthWest, 1267 * 1852.0, kCellM).value();
+}
+
 }  // namespace
 
+bool DrawThesisScene(const Terrain& terrain, const std::string& path) {
+  using client::cli::Canvas;
+  using client::cli::Colormap;
+  const std::vector<Corner> corners = WetWindows(terrain, 1);
+  if (corners.empty()) return false;
+  const Corner corner = corners.front();
+  const map::RootSquare root = ThesisRoot();
+  const map::NedFrame frame(kSouthWest);
+  map::GlobalMap map =
+      Transferred(root, frame, corner, [&terrain](int i, int j) {
+        return *terrain.DepthAt(i * kCellM, j * kCellM);
+      });
+  const std::uint64_t fine = map.View().leaf_count();
+  map.Conglomerate();
+  const map::GlobalMapView view = map.View();
+  const auto box = root.BoxAround(CornersOf(frame, corner));
+  if (!box.has_value()) return false;
+  float least_m = std::numeric_limits<float>::infinity();
+  float most_m = -least_m;
+  view.ForEachLeafIn(*box, [&](const map::CellKey&, const map::Leaf& leaf) {
+    if (!leaf.known()) return;
+    least_m = std::min(least_m, leaf.depth_m);
+    most_m = std::max(most_m, leaf.depth_m);
+  });
+  constexpr double kLeft = 20;
+  constexpr double kTop = 60;
+  constexpr double kPanel = 500;
+  Canvas canvas(540, 580);
+  canvas.Text(absl::StrFormat(
+                  "500 m x 500 m of Woods Hole: %d leaves, %.1f kB; %d before",
+                  view.leaf_count(),
+                  static_cast<double>(view.memory_bytes()) / 1000, fine),
+              kLeft, 26, {.size = 14, .bold = true});
+  canvas.Text(
+      absl::StrFormat("depth %.1f m (pale) to %.1f m (dark)", least_m, most_m),
+      kLeft, 46, {.size = 12});
+  const Colormap colors = Colormap::Depth();
+  view.ForEachLeafIn(*box, [&](const map::CellKey& cell,
+                               const map::Leaf& leaf) {
+    if (!leaf.known()) return;
+    cairo_t* const pen = canvas.cairo();
+    for (const map::GeodeticPoint& point : root.Corners(cell)) {
+      const map::NedPoint at = frame.ToNed(point);
+      cairo_line_to(
+          pen, kLeft + kPanel * (at.east_m / kCellM - corner.second) / kSide,
+          kTop + kPanel * (1 - (at.north_m / kCellM - corner.first) / kSide));
+    }
+    cairo_close_path(pen);
+    canvas.SetColor(colors.At((leaf.depth_m - least_m) /
+                              std::max(1e-3f, most_m - least_m)));
+    cairo_fill_preserve(pen);
+    canvas.SetColor({0.35, 0.38, 0.42});
+    cairo_set_line_width(pen, 0.6);
+    cairo_stroke(pen);
+  });
+  return canvas.WritePng(path).ok();
+}
+
 ThesisScene MeasureThesisScene(const Terrain& terrain, int windows) {
-  const map::RootSquare root =
-      map::RootSquare::CenteredOn(kSouthWest, 1267 * 1852.0, kCellM).value();
+  const map::RootSquare root = ThesisRoot();
   const map::NedFrame frame(kSouthWest);
   const auto depth_of = [&terrain](int i, int j) {
     return *terrain.DepthAt(i * kCellM, j * kCellM);

@@ -7,6 +7,7 @@
 #define FATHOM_TESTS_ACCURACY_THESIS_SCENE_H_
 
 #include <cstdint>
+#include <string>
 
 #include "tests/accuracy/terrain.h"
 
@@ -34,6 +35,10 @@ struct ThesisScene {
 // meet the quadtree alike, and is sounded in lines, every cell at its own time.
 // About 5 ms a window.
 ThesisScene MeasureThesisScene(const Terrain& terrain, int windows);
+
+// Draws the leaves of the first of these windows. False: there is none, or it
+// cannot be written.
+bool DrawThesisScene(const Terrain& terrain, const std::string& path);
 
 }  // namespace fathom::accuracy
 
