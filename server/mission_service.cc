@@ -206,6 +206,16 @@ grpc::ServerUnaryReactor* MissionService::GetMissionStatus(
   storage->set_journal_records(state.journal_records);
   storage->set_durable_revision(state.durable_revision);
   storage->set_fault(state.fault);
+  v1::ContactHistoryStatus* history = storage->mutable_contact_history();
+  history->set_estimates(file.history.estimates);
+  history->set_bytes(file.history.bytes);
+  history->set_forgotten_estimates(file.history.forgotten_estimates);
+  if (file.history_limits.max_age.has_value()) {
+    history->set_max_age_s(ToSeconds(*file.history_limits.max_age));
+  }
+  if (file.history_limits.max_bytes.has_value()) {
+    history->set_max_bytes(*file.history_limits.max_bytes);
+  }
   if (file.log_starved) {
     storage->set_warning(absl::StrFormat(
         "the write-ahead log has %d MiB: a long read (verify, save) keeps it "

@@ -13,6 +13,7 @@
 #include "server/convert_query.h"
 #include "server/convert_trajectory.h"
 #include "server/field_checks.h"
+#include "server/history_call.h"
 #include "server/region.h"
 #include "server/search_call.h"
 #include "server/watch_contacts.h"
@@ -132,93 +133,6 @@ grpc::ServerWriteReactor<typename Watch::Response>* StartWatch(
   stream->Begin();
   return stream.get();
 }
-
-absl::StatusOr<std::deque<v1::GetContactHistoryResponse>> ReadHistory(
-    storage::MissionFile& file, const v1::GetContactHistoryRequest& request) {
-  const FieldPath root;
-  FATHOM_RETURN_IF_ERROR(
-      CheckId(request.source_id(), FieldPath(root, "source_id")));
-  FATHOM_RETURN_IF_ERROR(CheckId(request.contact_id(),
-                                 FieldPath(root, "contact_id"),
-                                 /*allow_colon=*/true));
-  Time from = Time::min();
-  Time to = Time::max();
-  if (request.has_start_time()) {
-    FATHOM_ASSIGN_OR_RETURN(
-        from, CheckTime(request.start_time(), FieldPath(root, "start_time")));
-  }
-  const FieldPath end_path(root, "end_time");
-  if (request.has_end_time()) {
-    FATHOM_ASSIGN_OR_RETURN(to, CheckTime(request.end_time(), end_path));
-    if (to < from) {
-      return InvalidField(end_path.ToString(), "is before start_time");
-    }
-  }
-  const map::ContactKey key = {.source = {request.source_id()},
-                               .contact = {request.contact_id()}};
-  std::deque<v1::GetContactHistoryResponse> messages;
-  size_t count = 0;
-  const absl::Status read = file.ReadContactHistory(
-      key, from, to, [&](const storage::ContactHistoryRow& row) {
-        if (count == kMaxHistoryEstimates) {
-          count += 1;
-          return false;
-        }
-        if (count % kHistoryEstimatesPerMessage == 0) messages.emplace_back();
-        count += 1;
-        WriteContact(row.estimate, messages.back().add_estimates());
-        return true;
-      });
-  if (absl::IsNotFound(read)) {
-    return NoSuchContact(request.source_id(), request.contact_id());
-  }
-  FATHOM_RETURN_IF_ERROR(read);
-  if (count > kMaxHistoryEstimates) {
-    return LimitExceeded("estimates between start_time and end_time", count,
-                         kMaxHistoryEstimates);
-  }
-  return messages;
-}
-
-// Reads a history on a worker, then writes it as fast as the client reads.
-class HistoryStream final
-    : public grpc::ServerWriteReactor<v1::GetContactHistoryResponse> {
- public:
-  HistoryStream(ServerContext& context,
-                const v1::GetContactHistoryRequest& request)
-      : context_(context) {
-    context_.workers.Give([this, request] {
-      auto messages = ReadHistory(context_.file, request);
-      if (!messages.ok()) {
-        Finish(ToGrpc(messages.status()));
-        return;
-      }
-      messages_ = *std::move(messages);
-      WriteNext();
-    });
-  }
-  void OnWriteDone(bool ok) override {
-    messages_.pop_front();
-    if (!ok) messages_.clear();
-    WriteNext();
-  }
-  void OnDone() override {
-    context_.bulk_calls.GiveBack();
-    delete this;
-  }
-
- private:
-  void WriteNext() {
-    if (messages_.empty()) {
-      Finish(grpc::Status::OK);
-    } else {
-      StartWrite(&messages_.front());
-    }
-  }
-
-  ServerContext& context_;
-  std::deque<v1::GetContactHistoryResponse> messages_;
-};
 
 }  // namespace
 

@@ -55,19 +55,42 @@ absl::Status List(const Session& session, const std::string& time_text,
   return absl::OkStatus();
 }
 
-absl::Status History(const Session& session, const std::string& key_text,
-                     const std::string& from, const std::string& to) {
+struct HistoryFlags {
+  std::string key;
+  std::string from;
+  std::string to;
+  std::string south_west;
+  std::string north_east;
+};
+
+absl::Status History(const Session& session, const HistoryFlags& flags) {
   v1::GetContactHistoryRequest request;
-  FATHOM_ASSIGN_OR_RETURN(const auto key, ParseKey(key_text));
-  request.set_source_id(key.first);
-  request.set_contact_id(key.second);
-  if (!from.empty()) {
-    FATHOM_ASSIGN_OR_RETURN(const Time time, ParseMoment(from, session.Now()));
+  if (flags.key.empty() && flags.south_west.empty()) {
+    return UsageError(absl::InvalidArgumentError(
+        "name SOURCE/CONTACT, or an area: --south-west and --north-east"));
+  }
+  if (!flags.key.empty()) {
+    FATHOM_ASSIGN_OR_RETURN(const auto key, ParseKey(flags.key));
+    request.set_source_id(key.first);
+    request.set_contact_id(key.second);
+  }
+  if (!flags.from.empty()) {
+    FATHOM_ASSIGN_OR_RETURN(const Time time,
+                            ParseMoment(flags.from, session.Now()));
     *request.mutable_start_time() = ToProto(time);
   }
-  if (!to.empty()) {
-    FATHOM_ASSIGN_OR_RETURN(const Time time, ParseMoment(to, session.Now()));
+  if (!flags.to.empty()) {
+    FATHOM_ASSIGN_OR_RETURN(const Time time,
+                            ParseMoment(flags.to, session.Now()));
     *request.mutable_end_time() = ToProto(time);
+  }
+  if (!flags.south_west.empty()) {
+    FATHOM_ASSIGN_OR_RETURN(*request.mutable_south_west(),
+                            ParsePoint(flags.south_west));
+  }
+  if (!flags.north_east.empty()) {
+    FATHOM_ASSIGN_OR_RETURN(*request.mutable_north_east(),
+                            ParsePoint(flags.north_east));
   }
   FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<Client> client,
                           session.Connect());
@@ -226,19 +249,26 @@ void AddContacts(CLI::App& app, Session& session) {
     };
   });
 
-  CLI::App* history =
-      verb->add_subcommand("history", "One contact's track, oldest first");
-  const auto history_key = std::make_shared<std::string>();
-  const auto from = std::make_shared<std::string>();
-  const auto to = std::make_shared<std::string>();
-  history->add_option("SOURCE/CONTACT", *history_key, "As `list` prints it")
-      ->required();
-  history->add_option("--from", *from, "From this time, e.g. --from=-1h");
-  history->add_option("--to", *to, "To this time");
-  history->callback([&session, history_key, from, to]() {
-    session.run = [&session, history_key, from, to]() {
-      return History(session, *history_key, *from, *to);
-    };
+  CLI::App* history = verb->add_subcommand(
+      "history",
+      "One contact's track, or all that passed through an area, oldest first");
+  const auto asked = std::make_shared<HistoryFlags>();
+  history->add_option("SOURCE/CONTACT", asked->key,
+                      "As `list` prints it; not needed with an area");
+  history->add_option("--from", asked->from, "From this time, e.g. --from=-1h");
+  history->add_option("--to", asked->to, "To this time");
+  CLI::Option* const south_west =
+      history
+          ->add_option("--south-west", asked->south_west,
+                       "Only within this area: its south-west corner")
+          ->type_name("LAT,LON");
+  history
+      ->add_option("--north-east", asked->north_east,
+                   "and its north-east corner")
+      ->type_name("LAT,LON")
+      ->needs(south_west);
+  history->callback([&session, asked]() {
+    session.run = [&session, asked]() { return History(session, *asked); };
   });
 
   AddReport(*verb, session);

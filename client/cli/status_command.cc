@@ -51,6 +51,17 @@ std::string Summary(const v1::GetMissionStatusResponse& s) {
       CountText(storage.journal_records()),
       CountText(storage.durable_revision()),
       storage.fault().empty() ? "" : "\n  FAULT     " + storage.fault());
+  if (!storage.warning().empty()) {
+    absl::StrAppendFormat(&text, "            warning: %s\n",
+                          storage.warning());
+  }
+  const v1::ContactHistoryStatus& history = storage.contact_history();
+  absl::StrAppendFormat(
+      &text, "history     %s estimates of contacts, %s%s\n",
+      CountText(history.estimates()), BytesText(history.bytes()),
+      history.forgotten_estimates() == 0
+          ? ""
+          : "; " + CountText(history.forgotten_estimates()) + " forgotten");
   absl::StrAppendFormat(&text, "activities  %d\n", s.activities_size());
   for (const v1::ActivityStatus& a : s.activities()) {
     absl::StrAppendFormat(

@@ -275,6 +275,85 @@ class LinkedNames(LiveTest):
                           rejection.description)
 
 
+class PastByPlace(LiveTest):
+    """Who passed through an area; how much of the past is kept."""
+
+    def within(self, server, south_west, north_east, **fields):
+        return [(e.contact_id, e.time.seconds - START_S)
+                for part in server.obstacle.GetContactHistory(
+                    obstacle.GetContactHistoryRequest(
+                        south_west=south_west, north_east=north_east,
+                        **fields), timeout=DEADLINE_S)
+                for e in part.estimates]
+
+    def test_an_area_and_a_time_find_all_who_were_there(self):
+        # Two ships eastwards at 5 m/s, 1 km apart, for 300 s.
+        reports = [fix_report(2 * i + n, 1000 * n, 5 * i, second=i,
+                              contact=["south", "north"][n])
+                   for i in range(1, 301) for n in (0, 1)]
+        with self.new_mission() as server:
+            self.assertEqual(stream(server, reports), [])
+
+            def check():
+                # East 100 to 200 m: seconds 20 to 40, borders within 1 m.
+                middle = [("south", t) for t in range(20, 41)]
+                self.assertEqual(
+                    self.within(server, point(-10, 99), point(10, 201)),
+                    middle)
+                self.assertEqual(
+                    self.within(server, point(-10, 99), point(1010, 201),
+                                start_time=at(30), end_time=at(32)),
+                    [("north", t) for t in (30, 31, 32)]
+                    + [("south", t) for t in (30, 31, 32)])
+                self.assertEqual(
+                    self.within(server, point(-10, 99), point(1010, 201),
+                                source_id="c4i", contact_id="south"), middle)
+                self.assertEqual(
+                    self.within(server, point(2000, 0), point(3000, 900)), [])
+            check()
+            server.kill()
+        with self.reopen() as server:
+            check()
+            self.assertEqual(server.terminate(), 0)
+        with self.reopen() as server:
+            check()
+            kept = server.status().storage.contact_history
+            self.assertEqual(kept.estimates, 600)
+            self.assertEqual(kept.forgotten_estimates, 0)
+            self.assertFalse(kept.HasField("max_age_s"))
+            call = server.obstacle.GetContactHistory
+            request = obstacle.GetContactHistoryRequest
+            self.assert_field("north_east", call,
+                              request(south_west=point(0, 0)))
+            self.assert_field("south_west", call,
+                              request(north_east=point(0, 0)))
+            self.assert_field("north_east", call,
+                              request(south_west=point(0, 0),
+                                      north_east=point(-1, 1)))
+            self.assert_field("source_id", call,
+                              request(south_west=point(0, 0),
+                                      north_east=point(1, 1), contact_id="x"))
+
+    def test_what_is_too_old_is_forgotten_and_counted(self):
+        # 1000 s of one ship; the last 500 s and what shares their block stay.
+        day_s = 86_400
+        with self.new_mission("--history-max-age-days",
+                              str(500 / day_s)) as server:
+            self.assertEqual(stream(server, [
+                fix_report(i, 0, 5 * i, second=i)
+                for i in range(1, 1001)]), [])
+            # The end makes a snapshot.
+            self.assertEqual(server.terminate(), 0)
+        with self.reopen() as server:
+            kept = server.status().storage.contact_history
+            self.assertGreaterEqual(kept.estimates, 500)
+            self.assertLessEqual(kept.estimates, 500 + 256)
+            self.assertEqual(kept.estimates + kept.forgotten_estimates, 1000)
+            left = history(server, "c4i", "ship")
+            self.assertEqual(len(left), kept.estimates)
+            self.assertEqual(left[-1].time.seconds, START_S + 1000)
+
+
 class TooManyIds(LiveTest):
     def test_ten_thousand_at_once(self):
         reports = [fix_report(i, 0, i % 5000, contact=f"c{i}")
