@@ -349,7 +349,7 @@ absl::Status Spool::Append(std::string_view message) {
   frame += message;
   Segment& segment = segments_.back();
   if (!WriteWhole(append_, frame)) {
-    const absl::Status status = DiskError("write", segment.path);
+    absl::Status status = DiskError("write", segment.path);
     // No half message may stand before the next one.
     if (::ftruncate(append_, static_cast<off_t>(segment.bytes)) != 0) {
       return absl::DataLossError(std::string(status.message()));

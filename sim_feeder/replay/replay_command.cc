@@ -187,7 +187,7 @@ google::protobuf::Timestamp Shifted(const google::protobuf::Timestamp& time,
 }
 
 void PrintSummary(const ReplayContents& contents, const SinkState& state,
-                  double seconds) {
+                  const ActivityCounts& counts, double seconds) {
   absl::FPrintF(
       stderr,
       "sent %d pings (%d soundings among them), %d reports on %d contacts; "
@@ -197,13 +197,14 @@ void PrintSummary(const ReplayContents& contents, const SinkState& state,
       seconds > 0 ? static_cast<double>(contents.messages()) / seconds : 0.0);
   absl::FPrintF(stderr, "passed over: %s\n", Describe(contents.passed_over));
   absl::FPrintF(stderr, "measurements rejected: %s\n",
-                Describe(RejectCounts(state.pings)));
+                Describe(counts.rejects));
   absl::FPrintF(stderr, "reports rejected: %s\n",
                 Describe(RejectCounts(state.reports)));
 }
 
 std::string ToJson(const ReplayOptions& options, const ReplayContents& contents,
-                   const SinkState& state, double seconds) {
+                   const SinkState& state, const ActivityCounts& counts,
+                   double seconds) {
   nlohmann::ordered_json json = {
       {"files", options.paths},
       {"activity_id", options.activity_id},
@@ -217,9 +218,10 @@ std::string ToJson(const ReplayOptions& options, const ReplayContents& contents,
       {"passed_over", contents.passed_over},
       {"pings_durable", state.pings.durable_sequence},
       {"reports_durable", state.reports.durable_sequence},
-      {"measurements_accepted", state.pings.measurements_accepted},
-      {"rejects", RejectCounts(state.pings)},
+      {"measurements_accepted", counts.measurements_accepted},
+      {"rejects", counts.rejects},
       {"report_rejects", RejectCounts(state.reports)},
+      {"dropped", state.dropped},
       {"map_revision",
        std::max(state.pings.map_revision, state.reports.map_revision)},
       {"seconds", seconds}};
@@ -241,16 +243,30 @@ bool MayBeAway(const ReplayOptions& options, const ReplayContents& contents) {
          !(contents.pings > 0 && options.start_activity);
 }
 
+// `client`: asked for what acks that a cut swallowed have counted; null: not.
 absl::Status ReplayInto(const ReplayOptions& options,
-                        const ReplayContents& contents, MessageSink& sink) {
+                        const ReplayContents& contents,
+                        const client::Client* client, MessageSink& sink) {
   const SteadyClock::time_point start = SteadyClock::now();
-  FATHOM_RETURN_IF_ERROR(DriveReplay(options, contents, sink));
+  const absl::Status end = DriveReplay(options, contents, sink);
   const double seconds =
       std::chrono::duration<double>(SteadyClock::now() - start).count();
   const SinkState state = sink.State();
-  PrintSummary(contents, state, seconds);
+  // What was dropped is told even if the end is not reached.
+  if (state.dropped > 0) {
+    absl::FPrintF(stderr, "dropped by a full buffer: %d messages\n",
+                  state.dropped);
+  }
+  FATHOM_RETURN_IF_ERROR(end);
+  ActivityCounts counts = {
+      .measurements_accepted = state.pings.measurements_accepted,
+      .rejects = RejectCounts(state.pings)};
+  if (client != nullptr && state.pings.reconnects > 0) {
+    FATHOM_ASSIGN_OR_RETURN(counts, CountsOf(*client, options.activity_id));
+  }
+  PrintSummary(contents, state, counts, seconds);
   if (options.json) {
-    absl::PrintF("%s\n", ToJson(options, contents, state, seconds));
+    absl::PrintF("%s\n", ToJson(options, contents, state, counts, seconds));
   }
   return absl::OkStatus();
 }
@@ -346,7 +362,7 @@ absl::Status Replay(const ReplayOptions& options) {
         const std::unique_ptr<RecordSink> sink,
         RecordSink::Open(options.pings_out, options.reports_out,
                          options.link.source_id));
-    return ReplayInto(options, contents, *sink);
+    return ReplayInto(options, contents, nullptr, *sink);
   }
   FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<client::Client> client,
                           Connect(options.link, MayBeAway(options, contents)));
@@ -361,7 +377,8 @@ absl::Status Replay(const ReplayOptions& options) {
   }
   FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<MessageSink> sink,
                           OpenSink(*client, options.link, options.rate > 0.0));
-  FATHOM_RETURN_IF_ERROR(ReplayInto(options, contents, *sink));
+  FATHOM_RETURN_IF_ERROR(
+      ReplayInto(options, contents, opens ? client.get() : nullptr, *sink));
   if (contents.pings > 0 && options.complete_activity) {
     return CompleteActivity(*client, options.activity_id);
   }

@@ -174,6 +174,9 @@ class Replay(LiveTest):
             cut = self.replay(proxy.address, *arguments)
             self.assertEqual(proxy.made, 20)
             self.assertEqual(cut["pings_durable"], sent["pings"])
+            # Acks that a cut swallowed are counted all the same.
+            for key in ("measurements_accepted", "rejects"):
+                self.assertEqual(cut[key], sent[key])
             self.assertEqual(server.status(digest=True).map_digest, whole)
 
     def test_bad_input_ends_with_one_clear_line(self):
