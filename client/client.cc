@@ -190,11 +190,13 @@ std::unique_ptr<RegionWatch> Client::WatchRegion(
 std::unique_ptr<ContactsWatch> Client::WatchContacts(
     const v1::WatchContactsRequest& request,
     const WatchOptions& options) const {
+  v1::WatchContactsRequest batched = request;
+  batched.set_batched(true);
   return std::make_unique<ContactsWatch>(
       [stub = obstacle_](auto* context, const auto& asked) {
         return stub->WatchContacts(context, asked);
       },
-      request, options);
+      std::move(batched), options);
 }
 
 std::unique_ptr<TrajectoryWatch> Client::WatchTrajectory(

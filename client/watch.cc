@@ -1,6 +1,7 @@
 #include "client/watch.h"
 
 #include <algorithm>
+#include <deque>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -52,6 +53,35 @@ Told ToldOf(const v1::WatchTrajectoryResponse& event) {
   v1::CheckTrajectoryResponse verdict = event.verdict();
   verdict.clear_stamp();
   return {"", WordsOf(verdict) * 2 + (event.alert() ? 1 : 0)};
+}
+
+// A message's events.
+template <typename Response>
+std::deque<Response> EventsOf(Response message) {
+  std::deque<Response> events;
+  events.push_back(std::move(message));
+  return events;
+}
+std::deque<v1::WatchContactsResponse> EventsOf(
+    v1::WatchContactsResponse message) {
+  std::deque<v1::WatchContactsResponse> events;
+  if (!message.has_batch()) {
+    events.push_back(std::move(message));
+    return events;
+  }
+  const auto add = [&]() -> v1::WatchContactsResponse& {
+    v1::WatchContactsResponse& event = events.emplace_back();
+    *event.mutable_stamp() = message.stamp();
+    return event;
+  };
+  for (v1::ContactEstimate& estimate :
+       *message.mutable_batch()->mutable_estimates()) {
+    add().mutable_estimate()->Swap(&estimate);
+  }
+  if (message.batch().has_progress()) {
+    *add().mutable_progress() = message.batch().progress();
+  }
+  return events;
 }
 
 template <typename Request, typename Response>
@@ -117,6 +147,12 @@ bool Watch<Request, Response>::WaitFor(std::chrono::milliseconds pause) {
 }
 
 template <typename Request, typename Response>
+bool Watch<Request, Response>::IsCancelled() {
+  MutexLock lock(mutex_);
+  return cancelled_;
+}
+
+template <typename Request, typename Response>
 bool Watch<Request, Response>::Note(const Response& event) {
   if (event.has_progress()) {
     ResumeBehind(event, request_);
@@ -146,12 +182,18 @@ absl::StatusOr<Response> Watch<Request, Response>::Next() {
   // When the connection was lost; max: it is up.
   auto cut = SteadyClock::time_point::max();
   while (true) {
+    while (!waiting_.empty()) {
+      if (IsCancelled()) return absl::CancelledError("the watch was cancelled");
+      Response event = std::move(waiting_.front());
+      waiting_.pop_front();
+      if (Note(event)) return event;
+    }
     if (reader_ == nullptr && !Connect()) {
       return absl::CancelledError("the watch was cancelled");
     }
-    Response event;
-    if (reader_->Read(&event)) {
-      if (Note(event)) return event;
+    Response message;
+    if (reader_->Read(&message)) {
+      waiting_ = EventsOf(std::move(message));
       cut = SteadyClock::time_point::max();
       pause = kFirstPause;
       continue;

@@ -11,7 +11,7 @@
 // Events are the contract's own: first the state, then changes; a `progress`
 // whenever everything was told; a `resync` when the state comes anew (then
 // forget what was told before). After a cut the server may have to resync; that
-// is told like any other.
+// is told like any other. A batch of contacts is told one by one.
 //
 // Thread safety: one thread calls Next; any may call Cancel.
 
@@ -24,6 +24,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -74,6 +75,7 @@ class Watch {
   absl::Status Disconnect();
   // Waits before the next attempt; false once cancelled.
   bool WaitFor(std::chrono::milliseconds pause);
+  bool IsCancelled();
   // Keeps what a resumption needs; false: the event was told before the cut.
   bool Note(const Response& event);
 
@@ -81,6 +83,8 @@ class Watch {
   Request request_;
   const WatchOptions options_;
   Reader reader_;
+  // Events that came in one message and are yet to be told.
+  std::deque<Response> waiting_;
   // What was told since the last progress, by whom it is about: what a
   // resumption may tell again.
   std::map<std::string, std::size_t> told_;

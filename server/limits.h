@@ -179,8 +179,8 @@ inline constexpr size_t kMaxSearches = 256;
 inline constexpr size_t kSearchThreads = 2;
 // WatchRegion, WatchContacts and WatchTrajectory calls at once: some screens
 // and planners for each of kMaxIngestStreams vehicles. Each holds one message
-// (of a region 6 kB) and, of a region, one bit for kWatchTileSide squared
-// cells.
+// (of a region 6 kB, of contacts 25 kB) and, of a region, one bit for
+// kWatchTileSide squared cells.
 inline constexpr int kMaxWatchers = 256;
 // The part of them that watch trajectories: each may cost kMaxWatchCells cells
 // after every change.
@@ -197,6 +197,10 @@ inline constexpr size_t kMaxAreasAtOnce = 4096;
 // Side of the tiles in which a watched region is told, cells: a ping changes
 // few of them, and 16 x 16 cells are made in 0.3 ms.
 inline constexpr uint32_t kWatchTileSide = 16;
+// Estimates in one ContactBatch (the contract says 100): 25 kB. At 1000 reports
+// a second five wait when a watcher is woken; a first message, or one to a slow
+// reader, has more.
+inline constexpr size_t kEstimatesPerBatch = 100;
 // Changes are looked for at most so often, so that twenty views of the map
 // share the work.
 inline constexpr std::chrono::milliseconds kWatchInterval{5};

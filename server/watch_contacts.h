@@ -2,7 +2,8 @@
 // told as it is.
 //
 // As in watch_region.h there is no queue and no view is held: a contact that
-// waits is one bit, and told as it is when its turn comes.
+// waits is one bit, and told as it is when its turn comes. Who takes batches is
+// told all that waits at once, up to kEstimatesPerBatch.
 //
 // No gRPC. Not thread-safe; each call has its own.
 
@@ -26,17 +27,22 @@ class ContactsWatch {
 
   // The log must be followed (ChangeFeed::Add) before Next, and outlive this.
   ContactsWatch(const v1::WatchContactsRequest& request, const ChangeLog& log)
-      : log_(&log), progress_({request.from_revision(), request.run_id()}) {}
+      : log_(&log),
+        batched_(request.batched()),
+        progress_({request.from_revision(), request.run_id()}) {}
 
   // Writes the next message; kIdle: there is none now. Never an error.
   absl::StatusOr<WatchStep> Next(SteadyTime now, const std::atomic<bool>& stop,
                                  Response* out);
 
  private:
-  void WriteContactOf(const map::ContactKey& key,
-                      const map::ObstacleMapView& view, Response* out);
+  // Of the contacts that wait, as many as a message may tell. False: none,
+  // their names were lost.
+  bool WriteContacts(const map::ObstacleMapView& view, SteadyTime now,
+                     Response* out);
 
   const ChangeLog* log_;
+  bool batched_;
   // Contacts to be told, by their numbers in the log.
   Marks marks_;
   WatchProgressKeeper progress_;

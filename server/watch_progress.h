@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cstdint>
 
+#include "fathom/v1/obstacle_service.pb.h"
 #include "server/change_log.h"
 #include "server/convert_common.h"
 #include "server/limits.h"
@@ -60,12 +61,10 @@ class WatchProgressKeeper {
     return told_any_ || (view.revision() > said_revision_ &&
                          now - said_ >= kWatchProgressInterval);
   }
-  // Writes it.
-  template <typename Response>
+  // Writes it; `view` is that of the message's stamp.
   void Say(const map::ObstacleMapView& view, uint64_t run, SteadyTime now,
-           Response* out) {
-    out->mutable_progress()->set_run_id(run);
-    WriteStamp(view, out->mutable_stamp());
+           v1::WatchProgress* out) {
+    out->set_run_id(run);
     told_any_ = false;
     said_ = now;
     said_revision_ = view.revision();

@@ -125,7 +125,8 @@ absl::StatusOr<WatchStep> RegionWatch::Next(SteadyTime now,
     return WatchStep::kMessage;
   }
   if (!progress_.Due(*read.view, now)) return WatchStep::kIdle;
-  progress_.Say(*read.view, log_->run(), now, out);
+  progress_.Say(*read.view, log_->run(), now, out->mutable_progress());
+  WriteStamp(*read.view, out->mutable_stamp());
   return WatchStep::kMessage;
 }
 

@@ -8,6 +8,8 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <set>
+#include <string>
 
 #include "base/time.h"
 #include "client/client.h"
@@ -283,6 +285,71 @@ TEST_F(ClientLive, EveryQuestionOfAPlanner) {
   FATHOM_ASSERT_OK_AND_ASSIGN(const std::uint64_t tiles,
                               client->GetImport("none"));
   EXPECT_EQ(tiles, 0u);
+}
+
+TEST_F(ClientLive, AStreamOfContactsAndEveryWatch) {
+  constexpr int kContacts = 150;
+  LiveServer server(folder_, /*create=*/true);
+  ASSERT_NE(server.port(), 0);
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto client,
+                              Client::Connect(server.address(), {}));
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto stream,
+                              client->OpenContactStream({.source_id = "ais"}));
+  for (int k = 0; k < kContacts; ++k) {
+    v1::ContactReport report;
+    report.set_contact_id("ship-" + std::to_string(k));
+    report.set_contact_class(v1::CONTACT_CLASS_VESSEL);
+    report.mutable_time()->set_seconds(1'767'225'600);
+    report.mutable_fix()->mutable_position()->set_latitude_deg(41.5);
+    report.mutable_fix()->mutable_position()->set_longitude_deg(-71.4);
+    FATHOM_ASSERT_OK(stream->Send(report).status());
+  }
+  FATHOM_ASSERT_OK(stream->Finish());
+
+  // They come in two messages and are told one by one, then that this was all.
+  const auto contacts = client->WatchContacts();
+  std::set<std::string> told;
+  while (true) {
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto event, contacts->Next());
+    if (event.has_progress()) {
+      EXPECT_EQ(event.stamp().map_revision(), std::uint64_t{kContacts});
+      break;
+    }
+    ASSERT_TRUE(event.has_estimate()) << event.ShortDebugString();
+    EXPECT_TRUE(told.insert(event.estimate().contact_id()).second);
+  }
+  EXPECT_EQ(told.size(), std::size_t{kContacts});
+
+  // Whoever cancels is told nothing more, though some of a message is left.
+  const auto cancelled = client->WatchContacts();
+  FATHOM_ASSERT_OK(cancelled->Next().status());
+  cancelled->Cancel();
+  EXPECT_TRUE(absl::IsCancelled(cancelled->Next().status()));
+
+  v1::WatchRegionRequest area;
+  *area.mutable_region()->mutable_south_west() = WhereItHits(0, 0).position();
+  *area.mutable_region()->mutable_north_east() = WhereItHits(0, 0).position();
+  area.mutable_region()->mutable_north_east()->set_latitude_deg(41.501);
+  area.mutable_region()->mutable_north_east()->set_longitude_deg(-71.398);
+  area.mutable_region()->set_resolution_m(20);
+  const auto region = client->WatchRegion(area);
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto tile, region->Next());
+  EXPECT_TRUE(tile.has_tile());
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto all, region->Next());
+  EXPECT_TRUE(all.has_progress());
+
+  v1::WatchTrajectoryRequest way;
+  way.mutable_trajectory()->set_confidence(0.95);
+  for (const int k : {0, 1}) {
+    v1::Waypoint* waypoint = way.mutable_trajectory()->add_waypoints();
+    *waypoint->mutable_position() = WhereItHits(0, 0).position();
+    waypoint->mutable_position()->set_latitude_deg(41.5 + 0.001 * k);
+    waypoint->mutable_time()->set_seconds(1'767'225'600 + 100 * k);
+  }
+  const auto trajectory = client->WatchTrajectory(way);
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto verdict, trajectory->Next());
+  // Nothing is known of the water there, which counts as occupied.
+  EXPECT_TRUE(verdict.alert());
 }
 
 }  // namespace

@@ -187,6 +187,32 @@ class Contacts(LiveTest):
                 sorted((c, n) for c, n, _ in again.events),
                 sorted((f"ship{i}", 3 if i % 2 else 2) for i in range(1, 301)))
 
+    def test_batches_tell_the_same_in_fewer_messages(self):
+        with self.new_mission() as server:
+            report_contacts(server, [fix_report(i, contact=f"ship{i}")
+                                     for i in range(1, 251)])
+            reader = ContactsReader(server, batched=True)
+            reader.wait_for_revision(250)
+            self.assertEqual(reader.batches, [100, 100, 50])
+            report_contacts(server, [fix_report(251, second=10,
+                                                contact="ship3")])
+            reader.wait_for_revision(251)
+            self.assertEqual(reader.batches, [100, 100, 50, 1])
+            self.assertEqual(reader.events[250:], [("ship3", 2, 251)])
+            reader.cut()
+            report_contacts(server, [
+                fix_report(1000 + i, second=20, contact=f"ship{i}")
+                for i in range(1, 151)])
+            again = ContactsReader(server, batched=True, run_id=reader.run_id,
+                                   from_revision=reader.revision)
+            self.addCleanup(again.cut)
+            again.wait_for_revision(401)
+            self.assertEqual(again.resyncs, [])
+            self.assertEqual(again.batches, [100, 50])
+            self.assertEqual(sorted((c, n) for c, n, _ in again.events),
+                             sorted((f"ship{i}", 3 if i == 3 else 2)
+                                    for i in range(1, 151)))
+
     def test_a_restarted_server_resynchronises(self):
         with self.new_mission() as server:
             report_contacts(server, [fix_report(1)])
@@ -389,7 +415,8 @@ class Bounds(LiveTest):
             start_activity(server)
             area = bay(resolution_m=20)
             regions = [RegionReader(server, area) for _ in range(10)]
-            contacts = [ContactsReader(server) for _ in range(30)]
+            contacts = [ContactsReader(server, batched=i % 2 == 0)
+                        for i in range(30)]
             paths = [TrajectoryReader(server, Trajectories().along())
                      for _ in range(10)]
             sequence = 0

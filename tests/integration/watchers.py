@@ -114,21 +114,32 @@ class RegionReader(Reader):
 
 class ContactsReader(Reader):
 
-    def __init__(self, server, **resume):
+    def __init__(self, server, **options):
         self.contacts = {}
+        self.batches = []  # How many estimates each had.
         self.events = []  # (contact_id, report_count, revision) as they came.
         self.times = []   # When, time.monotonic().
         super().__init__(server.obstacle.WatchContacts,
-                         obstacle.WatchContactsRequest(**resume))
+                         obstacle.WatchContactsRequest(**options))
 
     def forget(self):
         self.contacts = {}
 
     def take(self, message):
-        estimate = message.estimate
+        if message.HasField("estimate"):
+            self.note(message.estimate, message.stamp)
+            return
+        for estimate in message.batch.estimates:
+            self.note(estimate, message.stamp)
+        self.batches.append(len(message.batch.estimates))
+        if message.batch.HasField("progress"):
+            self.revision = message.stamp.map_revision
+            self.run_id = message.batch.progress.run_id
+
+    def note(self, estimate, stamp):
         self.contacts[(estimate.source_id, estimate.contact_id)] = estimate
         self.events.append((estimate.contact_id, estimate.report_count,
-                            message.stamp.map_revision))
+                            stamp.map_revision))
         self.times.append(time.monotonic())
 
 

@@ -129,6 +129,9 @@ const first = stream => new Promise((resolve, reject) => {
 const watchedContact = await first(
     obstacle.WatchContacts({}, deadline()));
 assert.equal(watchedContact.estimate.sourceId, 'c4i');
+const watchedBatch = await first(
+    obstacle.WatchContacts({batched: true}, deadline()));
+assert.equal(watchedBatch.batch.estimates[0].sourceId, 'c4i');
 const watchedRegion = await first(obstacle.WatchRegion({region: {
   southWest: place(90, 190), northEast: place(120, 220), resolutionM: 10,
 }}, deadline()));

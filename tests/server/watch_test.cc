@@ -249,7 +249,11 @@ TEST(RegionWatch, MoreAtOnceThanIsNotedSendsEverything) {
 // A client of a contacts watch.
 class ContactsClient {
  public:
-  explicit ContactsClient(const ChangeLog& log) : log_(log) { Connect(); }
+  explicit ContactsClient(const ChangeLog& log, bool batched = false)
+      : log_(log) {
+    request_.set_batched(batched);
+    Connect();
+  }
   void Connect() { watch_.emplace(request_, log_); }
   void Resume() {
     request_.set_from_revision(revision_);
@@ -260,20 +264,23 @@ class ContactsClient {
     v1::WatchContactsResponse response;
     const auto step = watch_->Next(now_, kNever, &response);
     if (*step != WatchStep::kMessage) return false;
+    messages_ += 1;
     if (response.has_estimate()) {
-      const std::string& id = response.estimate().contact_id();
-      std::string words = response.estimate().SerializeAsString();
-      // Nothing is told twice on one connection.
-      EXPECT_NE(told_[id], words) << id;
-      told_[id] = words;
-      events_ += 1;
+      EXPECT_FALSE(request_.batched());
+      Take(response.estimate());
     } else if (response.has_resync()) {
       told_.clear();
       resyncs_ += 1;
+    } else if (response.has_batch()) {
+      EXPECT_TRUE(request_.batched());
+      EXPECT_GT(response.batch().estimates_size(), 0);
+      EXPECT_LE(response.batch().estimates_size(), 100);
+      for (const auto& estimate : response.batch().estimates()) Take(estimate);
+      if (response.batch().has_progress()) {
+        TakeProgress(response.stamp(), response.batch().progress());
+      }
     } else {
-      revision_ = response.stamp().map_revision();
-      run_ = response.progress().run_id();
-      EXPECT_EQ(told_, Now());
+      TakeProgress(response.stamp(), response.progress());
     }
     return true;
   }
@@ -284,10 +291,25 @@ class ContactsClient {
     }
   }
   int events() const { return events_; }
+  int messages() const { return messages_; }
   int resyncs() const { return resyncs_; }
   uint64_t revision() const { return revision_; }
 
  private:
+  void Take(const v1::ContactEstimate& estimate) {
+    const std::string& id = estimate.contact_id();
+    std::string words = estimate.SerializeAsString();
+    // Nothing is told twice on one connection.
+    EXPECT_NE(told_[id], words) << id;
+    told_[id] = words;
+    events_ += 1;
+  }
+  void TakeProgress(const v1::MapStamp& stamp,
+                    const v1::WatchProgress& progress) {
+    revision_ = stamp.map_revision();
+    run_ = progress.run_id();
+    EXPECT_EQ(told_, Now());
+  }
   std::map<std::string, std::string> Now() const {
     std::map<std::string, std::string> now;
     log_.view()->contacts().ForEach([&](const map::Contact& contact) {
@@ -306,6 +328,7 @@ class ContactsClient {
   uint64_t revision_ = 0;
   uint64_t run_ = 0;
   int events_ = 0;
+  int messages_ = 0;
   int resyncs_ = 0;
 };
 
@@ -316,20 +339,47 @@ TEST(ContactsWatch, StateAndChangesAreTheListAndNothingIsToldTwice) {
   map.Show();
   ContactsClient quick(map.log());
   ContactsClient slow(map.log());
+  ContactsClient quick_batched(map.log(), /*batched=*/true);
+  ContactsClient slow_batched(map.log(), /*batched=*/true);
   for (int step = 0; step < 4000; ++step) {
     map.Report("ship" + std::to_string(map.random()() % 700));
     if (step % 3 == 0) map.Show();
     quick.TakeAll();
+    quick_batched.TakeAll();
     if (map.Unit() < 0.5) slow.TakeOne();
+    if (map.Unit() < 0.02) slow_batched.TakeOne();
   }
   map.Show();
-  quick.TakeAll();
-  slow.TakeAll();
-  EXPECT_EQ(quick.revision(), map.log().view()->revision());
-  EXPECT_EQ(slow.revision(), map.log().view()->revision());
-  EXPECT_EQ(quick.resyncs() + slow.resyncs(), 0);
-  // The slow one was told less: changes coalesced.
+  for (ContactsClient* client :
+       {&quick, &slow, &quick_batched, &slow_batched}) {
+    client->TakeAll();
+    EXPECT_EQ(client->revision(), map.log().view()->revision());
+    EXPECT_EQ(client->resyncs(), 0);
+  }
+  // The slow ones were told less: changes coalesced.
   EXPECT_LT(slow.events(), quick.events());
+  EXPECT_LT(slow_batched.events(), quick_batched.events());
+  EXPECT_EQ(quick_batched.events(), quick.events());
+}
+
+TEST(ContactsWatch, ABatchHoldsAHundredAndSaysWhenItWasAll) {
+  WatchedMap map(14);
+  for (int k = 0; k < 250; ++k) map.Report("ship" + std::to_string(k));
+  map.Show();
+  ContactsClient client(map.log(), /*batched=*/true);
+  client.TakeAll();
+  // 100, 100 and 50, the last with the progress.
+  EXPECT_EQ(client.messages(), 3);
+  EXPECT_EQ(client.events(), 250);
+  EXPECT_EQ(client.revision(), map.log().view()->revision());
+  for (const int changed : {1, 100, 101}) {
+    const int before = client.messages();
+    for (int k = 0; k < changed; ++k) map.Report("ship" + std::to_string(k));
+    map.Show();
+    client.TakeAll();
+    EXPECT_EQ(client.messages() - before, changed > 100 ? 2 : 1) << changed;
+    EXPECT_EQ(client.revision(), map.log().view()->revision());
+  }
 }
 
 TEST(ContactsWatch, AHotContactStarvesNobodyAndIsNotStarved) {
