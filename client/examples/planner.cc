@@ -1,15 +1,20 @@
 // A path planner: the shortest way through water that the map is sure of.
 //
 //   planner 127.0.0.1:7430 41.5022,-71.3994 41.5022,-71.3946 10
+//   planner 127.0.0.1:7430 41.5022,-71.3994 41.5022,-71.3946 10 --go
 //
 // 1. GetRegion fetches the area around start and goal as one grid.
 // 2. A* finds the shortest way over its passable cells.
 // 3. CheckTrajectory judges the way as the map knows it, cell by cell of the
 //    finest layer and with every contact where it will be at the time. The
 //    legs that it objects to are closed in the grid, and step 2 runs again.
+// 4. With --go a vehicle sets out (here: a clock). WatchTrajectory tells when
+//    what is sounded or sighted meanwhile makes the way unsafe: the vehicle
+//    stops, and step 1 runs again from where it is.
 //
-// Prints one line for each waypoint. Exit code: 0 a free way was found, 3 there
-// is none, 1 anything else. The area must not cross the antimeridian.
+// Prints one line for each waypoint. Exit code: 0 a free way was found (with
+// --go: and the goal was reached), 3 there is none, 1 anything else. The area
+// must not cross the antimeridian.
 
 #include <algorithm>
 #include <array>
@@ -17,6 +22,8 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
+#include <future>
 #include <optional>
 #include <queue>
 #include <utility>
@@ -255,6 +262,11 @@ absl::StatusOr<Chart> FetchChart(const Client& client,
   return Chart(std::move(region), depth_m);
 }
 
+fathom::Time Now() {
+  return std::chrono::time_point_cast<fathom::Duration>(
+      std::chrono::system_clock::now());
+}
+
 // A way that CheckTrajectory calls FREE; absent if there is none.
 absl::StatusOr<std::optional<v1::Trajectory>> Plan(const Client& client,
                                                    Chart& chart, Cell start,
@@ -264,10 +276,7 @@ absl::StatusOr<std::optional<v1::Trajectory>> Plan(const Client& client,
     if (way.empty()) return std::nullopt;
     const std::vector<Cell> ends = Legs(chart, way);
     v1::CheckTrajectoryRequest request;
-    *request.mutable_trajectory() =
-        Timed(chart, ends, depth_m,
-              std::chrono::time_point_cast<fathom::Duration>(
-                  std::chrono::system_clock::now()));
+    *request.mutable_trajectory() = Timed(chart, ends, depth_m, Now());
     FATHOM_ASSIGN_OR_RETURN(const v1::CheckTrajectoryResponse verdict,
                             client.CheckTrajectory(request));
     if (verdict.state() == v1::OBSTACLE_STATE_FREE) {
@@ -288,28 +297,92 @@ absl::StatusOr<std::optional<v1::Trajectory>> Plan(const Client& client,
   return std::nullopt;
 }
 
-absl::StatusOr<int> Run(const char* server, const v1::GeodeticPoint& start,
-                        const v1::GeodeticPoint& goal, double depth_m) {
-  FATHOM_ASSIGN_OR_RETURN(const auto client, Client::Connect(server, {}));
-  FATHOM_ASSIGN_OR_RETURN(Chart chart,
-                          FetchChart(*client, start, goal, depth_m));
-  FATHOM_ASSIGN_OR_RETURN(
-      const std::optional<v1::Trajectory> plan,
-      Plan(*client, chart, chart.CellOf(start), chart.CellOf(goal), depth_m));
-  if (!plan.has_value()) {
-    std::printf("no way at %g m with %g m of clearance\n", depth_m,
-                kClearanceM);
-    return 3;
-  }
+void Print(const v1::Trajectory& plan) {
   std::printf("free at %g %% confidence:\n", 100 * kConfidence);
-  const auto begin = plan->waypoints(0).time().seconds();
-  for (const v1::Waypoint& waypoint : plan->waypoints()) {
+  const auto begin = plan.waypoints(0).time().seconds();
+  for (const v1::Waypoint& waypoint : plan.waypoints()) {
     std::printf("  %.6f,%.6f after %lld s\n",
                 waypoint.position().latitude_deg(),
                 waypoint.position().longitude_deg(),
                 static_cast<long long>(waypoint.time().seconds() - begin));
   }
-  return 0;
+  std::fflush(stdout);
+}
+
+// Where a vehicle is that follows the plan.
+v1::GeodeticPoint PositionAt(const v1::Trajectory& plan, fathom::Time time) {
+  const auto& waypoints = plan.waypoints();
+  int next = 1;
+  while (next + 1 < waypoints.size() &&
+         fathom::client::FromProto(waypoints[next].time()) < time) {
+    ++next;
+  }
+  const v1::Waypoint& a = waypoints[next - 1];
+  const v1::Waypoint& b = waypoints[next];
+  const fathom::Time left = fathom::client::FromProto(a.time());
+  const std::chrono::duration<double> leg =
+      fathom::client::FromProto(b.time()) - left;
+  const double share =
+      std::clamp(std::chrono::duration<double>(time - left) / leg, 0.0, 1.0);
+  v1::GeodeticPoint place;
+  place.set_latitude_deg(std::lerp(a.position().latitude_deg(),
+                                   b.position().latitude_deg(), share));
+  place.set_longitude_deg(std::lerp(a.position().longitude_deg(),
+                                    b.position().longitude_deg(), share));
+  return place;
+}
+
+// Follows the plan while it is safe; where that ended, absent: at the goal.
+absl::StatusOr<std::optional<v1::GeodeticPoint>> Follow(
+    const Client& client, const v1::Trajectory& plan) {
+  v1::WatchTrajectoryRequest request;
+  *request.mutable_trajectory() = plan;
+  const auto watch = client.WatchTrajectory(request);
+  std::future<absl::Status> alert =
+      std::async(std::launch::async, [&watch]() -> absl::Status {
+        while (true) {
+          FATHOM_ASSIGN_OR_RETURN(const v1::WatchTrajectoryResponse event,
+                                  watch->Next());
+          if (event.alert()) return absl::OkStatus();
+        }
+      });
+  const fathom::Time arrival = fathom::client::FromProto(
+      plan.waypoints(plan.waypoints_size() - 1).time());
+  if (alert.wait_until(arrival) == std::future_status::timeout) {
+    watch->Cancel();
+    return std::nullopt;
+  }
+  FATHOM_RETURN_IF_ERROR(alert.get());
+  return PositionAt(plan, Now());
+}
+
+absl::StatusOr<int> Run(const char* server, v1::GeodeticPoint start,
+                        const v1::GeodeticPoint& goal, double depth_m,
+                        bool go) {
+  FATHOM_ASSIGN_OR_RETURN(const auto client, Client::Connect(server, {}));
+  while (true) {
+    FATHOM_ASSIGN_OR_RETURN(Chart chart,
+                            FetchChart(*client, start, goal, depth_m));
+    FATHOM_ASSIGN_OR_RETURN(
+        const std::optional<v1::Trajectory> plan,
+        Plan(*client, chart, chart.CellOf(start), chart.CellOf(goal), depth_m));
+    if (!plan.has_value()) {
+      std::printf("no way at %g m with %g m of clearance\n", depth_m,
+                  kClearanceM);
+      return 3;
+    }
+    Print(*plan);
+    if (!go) return 0;
+    FATHOM_ASSIGN_OR_RETURN(const std::optional<v1::GeodeticPoint> stopped,
+                            Follow(*client, *plan));
+    if (!stopped.has_value()) {
+      std::printf("arrived\n");
+      return 0;
+    }
+    start = *stopped;
+    std::printf("alert: stopped at %.6f,%.6f\n", start.latitude_deg(),
+                start.longitude_deg());
+  }
 }
 
 std::optional<v1::GeodeticPoint> ParsePoint(const char* text) {
@@ -327,14 +400,17 @@ std::optional<v1::GeodeticPoint> ParsePoint(const char* text) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const auto start = argc == 5 ? ParsePoint(argv[2]) : std::nullopt;
-  const auto goal = argc == 5 ? ParsePoint(argv[3]) : std::nullopt;
+  const bool go = argc == 6 && std::strcmp(argv[5], "--go") == 0;
+  const bool complete = argc == 5 || go;
+  const auto start = complete ? ParsePoint(argv[2]) : std::nullopt;
+  const auto goal = complete ? ParsePoint(argv[3]) : std::nullopt;
   if (!start.has_value() || !goal.has_value()) {
-    std::fprintf(stderr, "usage: planner SERVER LAT,LON LAT,LON DEPTH_M\n");
+    std::fprintf(stderr,
+                 "usage: planner SERVER LAT,LON LAT,LON DEPTH_M [--go]\n");
     return 1;
   }
   const absl::StatusOr<int> code =
-      Run(argv[1], *start, *goal, std::atof(argv[4]));
+      Run(argv[1], *start, *goal, std::atof(argv[4]), go);
   if (!code.ok()) {
     std::fprintf(stderr, "%s\n", code.status().ToString().c_str());
     return 1;

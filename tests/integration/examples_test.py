@@ -7,14 +7,13 @@ import pathlib
 import re
 import subprocess
 import sys
-import time
 import unittest
 
 import node_tools
 from live_server import (AREA, DEADLINE_S, M_PER_LAT, M_PER_LON, ROOT,
                          LiveTest, chart_tile, fix_report, import_chart,
-                         ingest, mission, obstacle, ping, point,
-                         report_contacts, send_pings, start_activity, types)
+                         mission, ping, point, report_contacts, send_pings,
+                         start_activity, types)
 
 EXAMPLES = ROOT / "client" / "examples"
 BUILT = pathlib.Path(os.environ["FATHOM_EXAMPLES"])
@@ -49,11 +48,11 @@ def length_m(places):
     return sum(math.dist(a, b) for a, b in zip(places, places[1:]))
 
 
-def wall_distance_m(a, b):
+def wall_distance_m(a, b, wall_north_m=WALL_NORTH_M):
     """Least distance of the leg a-b from the wall's cells, every few metres."""
     steps = 200
     return min(
-        math.hypot(max(WALL_NORTH_M[0] - n, 0, n - WALL_NORTH_M[1]),
+        math.hypot(max(wall_north_m[0] - n, 0, n - wall_north_m[1]),
                    max(WALL_EAST_M - e, 0, e - WALL_EAST_M - 10))
         for n, e in ((a[0] + (b[0] - a[0]) * i / steps,
                       a[1] + (b[1] - a[1]) * i / steps)
@@ -115,6 +114,42 @@ class Examples(LiveTest):
             places = places_in(printed)
             self.assertGreater(len(places), 2)
             self.assertGreater(length_m(places), 400)
+
+    def test_planner_replans_when_its_way_is_no_longer_safe(self):
+        wall_north_m = (190.0, 220.0)
+        start, goal = (205, 205), (205, 305)
+        with self.new_mission() as server:
+            import_chart(server, chart_tile(std_m=1.0))
+            start_activity(server)
+            lines = []
+            with subprocess.Popen(
+                    [str(BUILT / "planner"), server.address,
+                     text_of(*start), text_of(*goal), "10", "--go"],
+                    stdout=subprocess.PIPE, text=True) as planner:
+                self.addCleanup(planner.kill)
+                for line in planner.stdout:
+                    lines.append(line)
+                    places = places_in("".join(lines))
+                    if places and math.dist(places[-1], goal) < 10:
+                        break
+                # Under way, it meets a wall: 3 cells of 10 m, 45 m ahead.
+                send_pings(server, [ping(1, [
+                    (north_m, WALL_EAST_M + 5, 3.0, 0.05)
+                    for north_m in (195.0, 205.0, 215.0)])])
+                lines += planner.stdout.readlines()
+            printed = "".join(lines)
+            self.assertEqual(planner.returncode, 0, printed)
+            before, after = printed.split("alert: stopped at ")
+            self.assertTrue(after.endswith("arrived\n"), printed)
+            old, new = places_in(before), places_in(after)
+            self.assertEqual(min(wall_distance_m(a, b, wall_north_m)
+                                 for a, b in zip(old, old[1:])), 0)
+            for a, b in zip(new, new[1:]):
+                self.assertGreater(wall_distance_m(a, b, wall_north_m),
+                                   RADIUS_M - 0.5, printed)
+            # It had not come far; cells of 10 m.
+            self.assertLess(math.dist(new[0], old[0]), 40)
+            self.assertLess(math.dist(new[-1], goal), 10)
 
     def test_map_matching_recovers_a_drift_of_40_m(self):
         def depth_m(north_m, east_m):
