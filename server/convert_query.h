@@ -6,6 +6,7 @@
 #ifndef FATHOM_SERVER_CONVERT_QUERY_H_
 #define FATHOM_SERVER_CONVERT_QUERY_H_
 
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "base/time.h"
@@ -24,10 +25,12 @@ void WriteAnswer(const map::ObstacleAnswer& answer, v1::ObstacleAnswer* out);
 
 // Checks the whole batch, then answers every point of it from `view`. On an
 // error `out` is unspecified. Errors: INVALID_ARGUMENT (field path, with the
-// index of the point), RESOURCE_EXHAUSTED past kMaxPointsPerQuery.
-absl::Status AnswerBatch(const v1::QueryObstaclesRequest& request, Time now,
-                         const map::ObstacleMapView& view,
-                         v1::QueryObstaclesResponse* out);
+// index of the point), RESOURCE_EXHAUSTED past kMaxPointsPerQuery; CANCELLED
+// soon after `unwanted` is true, which is asked now and then.
+absl::Status AnswerBatch(
+    const v1::QueryObstaclesRequest& request, Time now,
+    const map::ObstacleMapView& view, v1::QueryObstaclesResponse* out,
+    absl::FunctionRef<bool()> unwanted = [] { return false; });
 // The checks alone, for a request that has to wait for a revision.
 absl::Status CheckBatch(const v1::QueryObstaclesRequest& request);
 

@@ -165,13 +165,15 @@ grpc::ServerUnaryReactor* ObstacleService::QueryObstacles(
     if (!checked.ok()) return Reply(call, checked);
   }
   grpc::ServerUnaryReactor* reactor = call->DefaultReactor();
-  AtRevision(context_, *call, request->min_revision(),
-             [reactor, request, response, now](const absl::Status& status,
-                                               const ViewPtr& view) {
-               reactor->Finish(ToGrpc(
-                   status.ok() ? AnswerBatch(*request, now, *view, response)
-                               : status));
-             });
+  AtRevision(
+      context_, *call, request->min_revision(),
+      [call, reactor, request, response, now](const absl::Status& status,
+                                              const ViewPtr& view) {
+        reactor->Finish(ToGrpc(
+            status.ok() ? AnswerBatch(*request, now, *view, response,
+                                      [call] { return call->IsCancelled(); })
+                        : status));
+      });
   return reactor;
 }
 

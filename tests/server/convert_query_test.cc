@@ -127,6 +127,18 @@ TEST(AnswerBatch, TakesTheMostPointsAndNotOneMore) {
               StatusIs(absl::StatusCode::kResourceExhausted));
 }
 
+TEST(AnswerBatch, EndsSoonAfterNobodyWantsIt) {
+  const auto view = SampleMap().View();
+  v1::QueryObstaclesResponse response;
+  int looks = 0;
+  EXPECT_EQ(AnswerBatch(SampleBatch(100'000), kNow, *view, &response,
+                        [&looks] { return ++looks == 3; })
+                .code(),
+            absl::StatusCode::kCancelled);
+  EXPECT_EQ(looks, 3);
+  EXPECT_LE(response.probability_size(), 2'000);
+}
+
 TEST(AnswerBatch, GivesTheSameAnswersAsOneByOne) {
   map::ObstacleMap map = SampleMap();
   const auto view = map.View();
