@@ -4,6 +4,7 @@
 #include "tests/fuzz/requests.h"
 
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -12,14 +13,19 @@
 
 #include "map/obstacle_map/check_trajectory.h"
 #include "map/obstacle_map/find_nearest.h"
+#include "server/change_log.h"
 #include "server/convert_ingest.h"
 #include "server/convert_mission.h"
 #include "server/convert_query.h"
 #include "server/convert_trajectory.h"
 #include "server/region.h"
+#include "server/watch_contacts.h"
+#include "server/watch_region.h"
+#include "server/watch_trajectory.h"
 #include "tests/fuzz/fuzz.h"
 #include "tests/server/sample_map.h"
 #include "tests/server/sample_messages.h"
+#include "tests/testing/fake_clock.h"
 
 namespace fathom::fuzz {
 namespace {
@@ -185,6 +191,51 @@ void Fuzz(const v1::GetRegionRequest& request) {
   while (region->Next(stop, &out) == server::Region::Step::kBlock) out.Clear();
 }
 
+// A log that is shown one change; each watch reads from before it.
+const server::ChangeLog& Log() {
+  static const std::unique_ptr<server::ChangeLog> log = [] {
+    auto shown = std::make_unique<server::ChangeLog>(
+        kFuzzRun, server::ChangeLogOptions());
+    map::ObstacleMap map = NewMap();
+    shown->Restart(map.View());
+    const auto ping = server::ConvertPing(server::SamplePing(), FieldPath());
+    FATHOM_FUZZ_CHECK(ping.ok() && map.ApplyPing(*ping).ok());
+    const auto report = server::ConvertReport(server::SampleFix(), FieldPath());
+    FATHOM_FUZZ_CHECK(report.ok() && map.ApplyContact(*report).applied);
+    shown->Show(map.View());
+    return shown;
+  }();
+  return *log;
+}
+
+// All that a watch has to tell now, or what a test has patience for.
+template <typename Watch>
+void Follow(Watch watch) {
+  constexpr int kMostMessages = 20;
+  const std::atomic<bool> stop{false};
+  typename Watch::Response out;
+  for (int i = 0; i < kMostMessages; ++i) {
+    const auto step =
+        watch.Next(server::SteadyTime(std::chrono::hours(1)), stop, &out);
+    if (!step.ok() || *step != server::WatchStep::kMessage) return;
+  }
+}
+
+void Fuzz(const v1::WatchRegionRequest& request) {
+  static testing::FakeClock clock(kNow);
+  auto watch = server::RegionWatch::Create(request, Log(), clock);
+  if (watch.ok()) Follow(*std::move(watch));
+}
+
+void Fuzz(const v1::WatchContactsRequest& request) {
+  Follow(server::ContactsWatch(request, Log()));
+}
+
+void Fuzz(const v1::WatchTrajectoryRequest& request) {
+  auto watch = server::TrajectoryWatch::Create(request, Log(), kMostCells);
+  if (watch.ok()) Follow(*std::move(watch));
+}
+
 template <typename Message>
 void Parse(const std::uint8_t* bytes, std::size_t size) {
   Message message;
@@ -236,6 +287,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes,
       break;
     case Request::kGetRegion:
       Parse<v1::GetRegionRequest>(bytes, size);
+      break;
+    case Request::kWatchRegion:
+      Parse<v1::WatchRegionRequest>(bytes, size);
+      break;
+    case Request::kWatchContacts:
+      Parse<v1::WatchContactsRequest>(bytes, size);
+      break;
+    case Request::kWatchTrajectory:
+      Parse<v1::WatchTrajectoryRequest>(bytes, size);
       break;
     case Request::kCount:
       break;

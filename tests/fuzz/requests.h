@@ -21,8 +21,14 @@ enum class Request : std::uint8_t {
   kCheckTrajectory,
   kFindNearestObstacle,
   kGetRegion,
+  kWatchRegion,
+  kWatchContacts,
+  kWatchTrajectory,
   kCount,
 };
+
+// The run_id of the log that the watches read.
+inline constexpr std::uint64_t kFuzzRun = 77;
 
 }  // namespace fathom::fuzz
 

@@ -166,6 +166,20 @@ void WriteRequestSeeds(Seeds& seeds) {
   server::SetPoint(41.503, -71.397, region.mutable_north_east());
   region.set_resolution_m(20);
   seeds.WriteRequest("region", Request::kGetRegion, region);
+  v1::WatchRegionRequest watch_region;
+  *watch_region.mutable_region() = region;
+  seeds.WriteRequest("watch-region", Request::kWatchRegion, watch_region);
+  v1::WatchContactsRequest watch_contacts;
+  watch_contacts.set_from_revision(1);
+  watch_contacts.set_run_id(kFuzzRun);
+  watch_contacts.set_batched(true);
+  seeds.WriteRequest("watch-contacts", Request::kWatchContacts, watch_contacts);
+  v1::WatchTrajectoryRequest watch_trajectory;
+  *watch_trajectory.mutable_trajectory() = SampleTrajectory();
+  watch_trajectory.set_hysteresis(0.1);
+  watch_trajectory.set_alert_stands(true);
+  seeds.WriteRequest("watch-trajectory", Request::kWatchTrajectory,
+                     watch_trajectory);
 }
 
 }  // namespace
