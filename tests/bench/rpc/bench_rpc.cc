@@ -29,6 +29,7 @@ using SteadyClock = std::chrono::steady_clock;
 constexpr int kUnaryCallsPerRound = 1000;
 constexpr int kRateThreads = 4;
 constexpr int kRateCallsPerThread = 2000;
+constexpr int kPlacesAhead = 16;
 constexpr int kBatchPoints = 1000;
 constexpr int kBatchesPerRound = 200;
 
@@ -57,6 +58,29 @@ absl::StatusOr<double> UnaryP50Us(const Client& server, int round) {
     const auto start = SteadyClock::now();
     FATHOM_RETURN_IF_ERROR(server.QueryObstacle(query).status());
     times_us.push_back(SecondsSince(start) * 1e6);
+  }
+  return Median(std::move(times_us));
+}
+
+// Median latency of a planner in a loop, microseconds: it asks about the places
+// ahead of it, goes to the freest, and asks again from there; one connection,
+// each question behind the answer to the last.
+absl::StatusOr<double> PlannerP50Us(const Client& server, int round) {
+  std::mt19937_64 random(static_cast<uint64_t>(round));
+  v1::QueryObstaclesRequest ahead;
+  FillBatch(random, kPlacesAhead, ahead);
+  std::vector<double> times_us;
+  times_us.reserve(kUnaryCallsPerRound);
+  for (int i = 0; i < kUnaryCallsPerRound; ++i) {
+    const auto start = SteadyClock::now();
+    FATHOM_ASSIGN_OR_RETURN(const v1::QueryObstaclesResponse answers,
+                            server.QueryObstacles(ahead));
+    times_us.push_back(SecondsSince(start) * 1e6);
+    const auto freest = std::min_element(answers.probability().begin(),
+                                         answers.probability().end());
+    const auto chosen =
+        static_cast<int>(freest - answers.probability().begin());
+    MoveBatch(random, chosen, ahead);
   }
   return Median(std::move(times_us));
 }
@@ -183,6 +207,7 @@ absl::Status Run(const std::string& server, const std::string& null, int rounds,
   };
   FATHOM_RETURN_IF_ERROR(compare("unary_p50_ratio", "us", UnaryP50Us));
   FATHOM_RETURN_IF_ERROR(compare("unary_rate_ratio", "calls/s", UnaryRate));
+  FATHOM_RETURN_IF_ERROR(compare("planner_p50_ratio", "us", PlannerP50Us));
   FATHOM_RETURN_IF_ERROR(
       compare("batch_points_ratio", "points/s", BatchPoints));
   FATHOM_RETURN_IF_ERROR(compare("ingest_pings_ratio", "pings/s",

@@ -1,6 +1,8 @@
 #include "tests/bench/rpc/bench_rpc_scene.h"
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 
 #include "base/status_macros.h"
@@ -119,6 +121,29 @@ void FillBatch(std::mt19937_64& random, int points,
   batch.set_confidence(0.95);
   batch.set_vertical_clearance_m(1);
   batch.set_radius_m(2);
+}
+
+void MoveBatch(std::mt19937_64& random, int chosen,
+               v1::QueryObstaclesRequest& batch) {
+  constexpr double kAheadM = 20;
+  double north_m =
+      (batch.latitude_deg(chosen) - kLatitudeDeg) * kMetresPerLatitudeDeg;
+  double east_m =
+      (batch.longitude_deg(chosen) - kLongitudeDeg) * kMetresPerLongitudeDeg;
+  if (std::min({north_m, east_m, kAreaM - north_m, kAreaM - east_m}) < 50) {
+    north_m = east_m = kAreaM / 2;
+  }
+  const double heading_rad = Uniform(random, 0, 2 * std::numbers::pi);
+  const int count = batch.latitude_deg_size();
+  v1::GeodeticPoint place;
+  for (int i = 0; i < count; ++i) {
+    const double bearing_rad =
+        heading_rad + std::numbers::pi * (static_cast<double>(i) / count - 0.5);
+    FillPlace(north_m + kAheadM * std::cos(bearing_rad),
+              east_m + kAheadM * std::sin(bearing_rad), place);
+    batch.set_latitude_deg(i, place.latitude_deg());
+    batch.set_longitude_deg(i, place.longitude_deg());
+  }
 }
 
 }  // namespace fathom::bench

@@ -34,6 +34,11 @@ void FillQuery(std::mt19937_64& random, v1::QueryObstacleRequest& query);
 void FillBatch(std::mt19937_64& random, int points,
                v1::QueryObstaclesRequest& batch);
 
+// The same many questions about the way ahead of point `chosen` of `batch`, in
+// an arc of 20 m; back in the middle where the area ends.
+void MoveBatch(std::mt19937_64& random, int chosen,
+               v1::QueryObstaclesRequest& batch);
+
 }  // namespace fathom::bench
 
 #endif  // FATHOM_TESTS_BENCH_RPC_BENCH_RPC_SCENE_H_
