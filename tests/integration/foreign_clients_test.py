@@ -11,7 +11,7 @@ import textwrap
 import unittest
 
 import node_tools
-from live_server import (CREATE, DEADLINE_S, FATHOM, ROOT, LiveTest, Server,
+from live_server import (DEADLINE_S, FATHOM, ROOT, LiveTest, Server,
                          import_chart)
 from node_tools import BUF, NODE
 

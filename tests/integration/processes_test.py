@@ -12,9 +12,9 @@ import grpc
 from google.protobuf import descriptor_pb2
 
 from live_server import (CREATE, DEADLINE_S, FATHOMD, ROOT, LiveTest, Server,
-                         ask, at, import_chart, ingest, mission_rpc, mission,
-                         obstacle, ping, point, send_pings, start_activity,
-                         types, wait_until)
+                         ask, import_chart, ingest, mission_rpc, mission,
+                         obstacle, ping, point, start_activity, types,
+                         wait_until)
 # The stubs are importable behind live_server only.
 from grpc.health.v1 import health_pb2, health_pb2_grpc  # isort: skip
 
