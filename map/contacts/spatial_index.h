@@ -110,10 +110,17 @@ class SpatialIndex {
   // `entry` in its place; whether it did that.
   bool Change(const Contact* contact, std::uint64_t code,
               const SpatialEntry* entry, std::uint64_t epoch);
+  // Insert without Settle.
+  void Add(const SpatialEntry& entry, std::uint64_t epoch);
+  // Finds top_ again after a change.
+  void Settle();
   // The node, or a copy of it that this epoch may change.
   static Node& Own(std::shared_ptr<Node>& node, std::uint64_t epoch);
 
   std::shared_ptr<Node> root_;
+  // The first node below the root that has not one child alone: contacts of
+  // one sea share half a dozen nodes that tell them not apart. root_ keeps it.
+  const Node* top_ = nullptr;
 };
 
 }  // namespace fathom::map
