@@ -82,8 +82,9 @@ struct Conflict {
   GeodeticPoint position;
   // The vehicle's depth when it is nearest.
   double depth_m = 0;
-  // When the swept disc first touches the cell, early by at most 0.21 of the
-  // cell's side; of a contact, when P first reaches c at a time looked at.
+  // When the cell's middle, seen along the leg, is w and half the cell's
+  // diagonal ahead: never later than the swept disc touches the cell; of a
+  // contact, when P first reaches c at a time looked at.
   Time time;
   ObstacleAnswer answer;
 };
