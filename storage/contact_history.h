@@ -14,6 +14,7 @@
 #define FATHOM_STORAGE_CONTACT_HISTORY_H_
 
 #include <deque>
+#include <memory>
 #include <span>
 #include <unordered_map>
 #include <vector>
