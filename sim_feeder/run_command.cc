@@ -142,7 +142,8 @@ RunOptions OptionsOf(const RunOptions& options, int number) {
 
 // REQUIRES: the area was decided, the seabed lies about it.
 absl::StatusOr<std::unique_ptr<Simulation>> PrepareSimulation(
-    const RunOptions& options, std::shared_ptr<const LocalTerrain> seabed) {
+    const RunOptions& options,
+    const std::shared_ptr<const LocalTerrain>& seabed) {
   Scenario scenario = options.scenario;
   if (options.duration_s.has_value()) {
     if (!(*options.duration_s > 0.0) || !(*options.duration_s < 1e9)) {
