@@ -14,6 +14,7 @@
 #include "tests/accuracy/figures.h"
 #include "tests/accuracy/limits.h"
 #include "tests/accuracy/thesis_local.h"
+#include "tests/accuracy/thesis_picture.h"
 #include "tests/accuracy/thesis_scene.h"
 
 namespace fathom::accuracy {

@@ -3,15 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <random>
 #include <utility>
 #include <vector>
 
-#include "absl/strings/str_format.h"
-#include "client/cli/canvas.h"
-#include "client/cli/colormap.h"
 #include "map/geodesy/ned_frame.h"
 #include "map/global/global_map.h"
 
@@ -134,62 +130,21 @@ map::RootSquare ThesisRoot() {
 
 }  // namespace
 
-bool DrawThesisScene(const Terrain& terrain, const std::string& path) {
-  using client::cli::Canvas;
-  using client::cli::Colormap;
+std::optional<ThesisWindow> FirstThesisWindow(const Terrain& terrain) {
   const std::vector<Corner> corners = WetWindows(terrain, 1);
-  if (corners.empty()) return false;
+  if (corners.empty()) return std::nullopt;
   const Corner corner = corners.front();
-  const map::RootSquare root = ThesisRoot();
   const map::NedFrame frame(kSouthWest);
   map::GlobalMap map =
-      Transferred(root, frame, corner, [&terrain](int i, int j) {
+      Transferred(ThesisRoot(), frame, corner, [&terrain](int i, int j) {
         return *terrain.DepthAt(i * kCellM, j * kCellM);
       });
-  const std::uint64_t fine = map.View().leaf_count();
+  const std::uint64_t fine_leaves = map.View().leaf_count();
   map.Conglomerate();
-  const map::GlobalMapView view = map.View();
-  const auto box = root.BoxAround(CornersOf(frame, corner));
-  if (!box.has_value()) return false;
-  float least_m = std::numeric_limits<float>::infinity();
-  float most_m = -least_m;
-  view.ForEachLeafIn(*box, [&](const map::CellKey&, const map::Leaf& leaf) {
-    if (!leaf.known()) return;
-    least_m = std::min(least_m, leaf.depth_m);
-    most_m = std::max(most_m, leaf.depth_m);
-  });
-  constexpr double kLeft = 20;
-  constexpr double kTop = 60;
-  constexpr double kPanel = 500;
-  Canvas canvas(540, 580);
-  canvas.Text(absl::StrFormat(
-                  "500 m x 500 m of Woods Hole: %d leaves, %.1f kB; %d before",
-                  view.leaf_count(),
-                  static_cast<double>(view.memory_bytes()) / 1000, fine),
-              kLeft, 26, {.size = 14, .bold = true});
-  canvas.Text(
-      absl::StrFormat("depth %.1f m (pale) to %.1f m (dark)", least_m, most_m),
-      kLeft, 46, {.size = 12});
-  const Colormap colors = Colormap::Depth();
-  view.ForEachLeafIn(*box, [&](const map::CellKey& cell,
-                               const map::Leaf& leaf) {
-    if (!leaf.known()) return;
-    cairo_t* const pen = canvas.cairo();
-    for (const map::GeodeticPoint& point : root.Corners(cell)) {
-      const map::NedPoint at = frame.ToNed(point);
-      cairo_line_to(
-          pen, kLeft + kPanel * (at.east_m / kCellM - corner.second) / kSide,
-          kTop + kPanel * (1 - (at.north_m / kCellM - corner.first) / kSide));
-    }
-    cairo_close_path(pen);
-    canvas.SetColor(colors.At((leaf.depth_m - least_m) /
-                              std::max(1e-3f, most_m - least_m)));
-    cairo_fill_preserve(pen);
-    canvas.SetColor({0.35, 0.38, 0.42});
-    cairo_set_line_width(pen, 0.6);
-    cairo_stroke(pen);
-  });
-  return canvas.WritePng(path).ok();
+  return ThesisWindow{.view = map.View(),
+                      .fine_leaves = fine_leaves,
+                      .frame = frame,
+                      .corners = CornersOf(frame, corner)};
 }
 
 ThesisScene MeasureThesisScene(const Terrain& terrain, int windows) {

@@ -6,9 +6,13 @@
 #ifndef FATHOM_TESTS_ACCURACY_THESIS_SCENE_H_
 #define FATHOM_TESTS_ACCURACY_THESIS_SCENE_H_
 
+#include <array>
 #include <cstdint>
-#include <string>
+#include <optional>
 
+#include "map/geodesy/ned_frame.h"
+#include "map/geodesy/points.h"
+#include "map/global/global_map_view.h"
 #include "tests/accuracy/terrain.h"
 
 namespace fathom::accuracy {
@@ -36,9 +40,18 @@ struct ThesisScene {
 // About 5 ms a window.
 ThesisScene MeasureThesisScene(const Terrain& terrain, int windows);
 
-// Draws the leaves of the first of these windows. False: there is none, or it
-// cannot be written.
-bool DrawThesisScene(const Terrain& terrain, const std::string& path);
+// The first of these windows, transferred and conglomerated.
+struct ThesisWindow {
+  map::GlobalMapView view;
+  // Leaves before conglomeration.
+  std::uint64_t fine_leaves = 0;
+  // Of the terrain, and the window's corners: south-west, north-west,
+  // north-east, south-east.
+  map::NedFrame frame;
+  std::array<map::GeodeticPoint, 4> corners;
+};
+// nullopt: the terrain has no wet window.
+std::optional<ThesisWindow> FirstThesisWindow(const Terrain& terrain);
 
 }  // namespace fathom::accuracy
 
