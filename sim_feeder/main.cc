@@ -293,8 +293,8 @@ CLI::App* AddRun(CLI::App& app, RunOptions& run) {
   command
       ->add_option("--prepare-mib", run.prepare_mib,
                    "Make so much of the messages (as sent; twice that in "
-                   "memory) before the first goes out: to load a server, not "
-                   "this machine's simulation")
+                   "memory; shared by --vehicles) before a vehicle's first "
+                   "goes out: to load a server, not this machine's simulation")
       ->capture_default_str()
       ->check(CLI::Range(0, 16'384));
   command

@@ -135,6 +135,7 @@ RunOptions OptionsOf(const RunOptions& options, int number) {
     own.scenario.activity_id += suffix;
   }
   own.scenario.seed += static_cast<std::uint64_t>(number - 1);
+  own.prepare_mib /= static_cast<std::uint64_t>(options.vehicles);
   // One bar on one terminal.
   own.show_progress = options.show_progress && number == 1;
   return own;
@@ -270,21 +271,25 @@ absl::Status DriveSurvey(Simulation& simulation, MessageSink& sink, double rate,
   PreparedMessages messages(simulation, prepare_bytes);
   ProgressBar bar(simulation.pings_planned(), "pings", show_progress);
   const SteadyClock::time_point start = SteadyClock::now();
-  while (const std::optional<Simulation::Message> message = messages.Next()) {
+  absl::Status sent;
+  while (sent.ok()) {
+    const std::optional<Simulation::Message> message = messages.Next();
+    if (!message.has_value()) break;
     if (rate > 0.0) {
       std::this_thread::sleep_until(
           start + std::chrono::duration_cast<SteadyClock::duration>(
                       std::chrono::duration<double>(messages.now_s() / rate)));
     }
     if (v1::Ping* const* ping = std::get_if<v1::Ping*>(&*message)) {
-      FATHOM_RETURN_IF_ERROR(sink.SendPing(**ping));
+      sent = sink.SendPing(**ping);
+      if (!sent.ok()) break;
       ++record.pings;
       record.measurements +=
           static_cast<std::uint64_t>((*ping)->range_m_size());
       if (track != nullptr) WriteTrackLine(simulation, *track);
     } else {
-      FATHOM_RETURN_IF_ERROR(
-          sink.SendReport(*std::get<v1::ContactReport*>(*message)));
+      sent = sink.SendReport(*std::get<v1::ContactReport*>(*message));
+      if (!sent.ok()) break;
       ++record.contact_reports;
     }
     if (bar.Due()) {
@@ -292,13 +297,13 @@ absl::Status DriveSurvey(Simulation& simulation, MessageSink& sink, double rate,
     }
   }
   // What was sent and dropped is told even if the end is not reached.
-  const absl::Status end = sink.Finish();
+  if (sent.ok()) sent = sink.Finish();
   record.seconds = SecondsSince(start);
   record.pings_silent = simulation.pings_silent();
   const SinkState state = sink.State();
   AddAcks(state, record);
   bar.Finish(messages.pings_done(), RejectNote(state));
-  return end;
+  return sent;
 }
 
 absl::StatusOr<std::vector<SurveyRecord>> PerformSurveys(
@@ -341,7 +346,20 @@ absl::StatusOr<std::vector<SurveyRecord>> PerformSurveys(
                   [](const SurveyRecord& r) { return r.pings > 0; })) {
     PrintSummary(records);
   }
-  for (const absl::Status& end : ends) FATHOM_RETURN_IF_ERROR(end);
+  const auto failed =
+      std::find_if_not(ends.begin(), ends.end(),
+                       [](const absl::Status& end) { return end.ok(); });
+  if (failed != ends.end() && ends.size() > 1) {
+    const auto which = static_cast<std::size_t>(failed - ends.begin());
+    return absl::Status(
+        failed->code(),
+        absl::StrFormat(
+            "%s (%d of %d vehicles failed): %s", records[which].source_id,
+            std::count_if(ends.begin(), ends.end(),
+                          [](const absl::Status& end) { return !end.ok(); }),
+            ends.size(), failed->message()));
+  }
+  if (failed != ends.end()) return *failed;
   if (client != nullptr && options.complete_activity) {
     FATHOM_RETURN_IF_ERROR(
         CompleteActivity(*client, options.scenario.activity_id));

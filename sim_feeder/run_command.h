@@ -38,7 +38,8 @@ struct RunOptions {
   // Times real time; 0: flat out.
   double rate = 0.0;
 
-  // So much of the messages of each vehicle is made before the first is sent,
+  // So much of the messages, shared by the vehicles, is made before the first
+  // of a vehicle is sent,
   // MiB (prepared_messages.h); not with track_out.
   std::uint64_t prepare_mib = 0;
 
