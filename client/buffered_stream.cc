@@ -22,8 +22,10 @@ constexpr std::chrono::milliseconds kThreadPatience{500};
 constexpr int kLookEvery = 256;
 // With nothing to send the thread looks for acks so often.
 constexpr std::chrono::milliseconds kIdleLook{5};
-// At most so much is lost to a power cut while the server is away.
+// At most so much is lost to a power cut.
 constexpr std::chrono::seconds kSyncEvery{1};
+
+static_assert(kMaxIngestMessageBytes <= kMostSpoolMessageBytes);
 
 template <typename Message>
 constexpr bool kIsPing = std::is_same_v<Message, v1::Ping>;
@@ -96,19 +98,19 @@ void BufferedStream<Message>::Pump() {
 
 template <typename Message>
 void BufferedStream<Message>::Step(Message& message, bool& holds) {
-  if (!holds) {
-    std::string bytes;
+  {
     MutexLock lock(mutex_);
-    absl::StatusOr<bool> read = spool_->Read(bytes);
-    if (read.ok() && *read && !message.ParseFromString(bytes)) {
-      read = absl::DataLossError("a buffered message cannot be read");
+    if (!holds) {
+      std::string bytes;
+      absl::StatusOr<bool> read = spool_->Read(bytes);
+      if (read.ok() && *read && !message.ParseFromString(bytes)) {
+        read = absl::DataLossError("a buffered message cannot be read");
+      }
+      if (!read.ok()) return Fail(read.status());
+      holds = *read;
     }
-    if (!read.ok()) {
-      failed_ = read.status();
-      gone_.NotifyAll();
-      return;
-    }
-    holds = *read;
+    const absl::Status synced = SyncInTime(holds);
+    if (!synced.ok()) return Fail(synced);
   }
   // Unlocked: a server that is away must not keep callers from sending.
   absl::Status status;
@@ -116,8 +118,9 @@ void BufferedStream<Message>::Step(Message& message, bool& holds) {
   if (holds) {
     status = stream_->Send(message).status();
   } else {
+    const std::uint64_t durable = stream_->progress().durable_sequence;
     MutexLock lock(mutex_);
-    ReleaseDurable();
+    ReleaseDurable(durable);
     if (stop_ || spool_->last_sequence() > sent_) return;
     waits = durable_ < sent_;
     // An idle stream is woken by the next message.
@@ -129,13 +132,32 @@ void BufferedStream<Message>::Step(Message& message, bool& holds) {
   }
   // Also mends a link that was cut with messages on the way.
   if (waits) status = stream_->Flush();
+  const bool look = waits || !status.ok() || ++since_look_ >= kLookEvery;
+  const std::uint64_t durable = look ? stream_->progress().durable_sequence : 0;
+  if (look) since_look_ = 0;
   MutexLock lock(mutex_);
   if (holds && status.ok()) {
     holds = false;
     ++sent_;
   }
   Note(status);
-  if (waits || !status.ok() || ++since_look_ >= kLookEvery) ReleaseDurable();
+  ReleaseDurable(durable);
+}
+
+template <typename Message>
+absl::Status BufferedStream<Message>::SyncInTime(bool holds) {
+  const bool due = SteadyClock::now() - synced_ >= kSyncEvery;
+  if (!due && (!holds || spool_->synced_sequence() > sent_)) {
+    return absl::OkStatus();
+  }
+  synced_ = SteadyClock::now();
+  return spool_->SyncUnlocked(mutex_);
+}
+
+template <typename Message>
+void BufferedStream<Message>::Fail(const absl::Status& status) {
+  failed_ = status;
+  gone_.NotifyAll();
 }
 
 template <typename Message>
@@ -143,31 +165,17 @@ void BufferedStream<Message>::Note(const absl::Status& status) {
   link_ = status;
   if (!status.ok() && !MayMend(status.code()) &&
       !absl::IsDeadlineExceeded(status)) {
-    failed_ = status;
-    gone_.NotifyAll();
+    Fail(status);
   }
 }
 
 template <typename Message>
-void BufferedStream<Message>::ReleaseDurable() {
-  since_look_ = 0;
-  const std::uint64_t durable = stream_->progress().durable_sequence;
-  absl::Status status;
-  if (durable > durable_) {
-    durable_ = durable;
-    status = spool_->Release(durable);
-    gone_.NotifyAll();
-  }
-  const SteadyClock::time_point now = SteadyClock::now();
-  if (status.ok() && durable_ < spool_->last_sequence() &&
-      now - synced_ >= kSyncEvery) {
-    synced_ = now;
-    status = spool_->Sync();
-  }
-  if (!status.ok()) {
-    failed_ = status;
-    gone_.NotifyAll();
-  }
+void BufferedStream<Message>::ReleaseDurable(std::uint64_t durable) {
+  if (durable <= durable_) return;
+  durable_ = durable;
+  const absl::Status status = spool_->Release(durable);
+  if (!status.ok()) failed_ = status;
+  gone_.NotifyAll();
 }
 
 template <typename Message>
@@ -196,25 +204,33 @@ absl::Status BufferedStream<Message>::WaitUntil(
 template <typename Message>
 absl::StatusOr<bool> BufferedStream<Message>::Send(Message& message) {
   MutexLock lock(mutex_);
-  if (finished_) {
-    return absl::FailedPreconditionError("the stream was finished");
-  }
   if (!failed_.ok()) return failed_;
   message.set_source_id(spool_->source_id());
   message.set_epoch(spool_->epoch());
-  message.set_sequence(spool_->last_sequence() + 1);
-  const std::string bytes = message.SerializeAsString();
+  std::string bytes;
+  // Others may take the number, or finish, while this one waits for room.
+  const auto fits = [&]() FATHOM_REQUIRES(mutex_) {
+    message.set_sequence(spool_->last_sequence() + 1);
+    bytes = message.SerializeAsString();
+    return spool_->HasRoom(bytes.size());
+  };
+  const bool room = fits();
   if (bytes.size() > kMaxIngestMessageBytes) {
     return absl::InvalidArgumentError(
         absl::StrFormat("message of %d bytes: at most %d are accepted",
                         bytes.size(), kMaxIngestMessageBytes));
   }
-  if (!spool_->HasRoom(bytes.size()) && options_.drop_when_full) {
+  if (!room && !finished_ && options_.drop_when_full) {
     ++dropped_;
     return false;
   }
-  FATHOM_RETURN_IF_ERROR(WaitUntil(
-      [&]() FATHOM_REQUIRES(mutex_) { return spool_->HasRoom(bytes.size()); }));
+  if (!room) {
+    FATHOM_RETURN_IF_ERROR(WaitUntil(
+        [&]() FATHOM_REQUIRES(mutex_) { return finished_ || fits(); }));
+  }
+  if (finished_) {
+    return absl::FailedPreconditionError("the stream was finished");
+  }
   const absl::Status status = spool_->Append(bytes);
   // A full disk is a full buffer.
   if (absl::IsResourceExhausted(status) && options_.drop_when_full) {
@@ -230,6 +246,7 @@ template <typename Message>
 absl::Status BufferedStream<Message>::Finish() {
   MutexLock lock(mutex_);
   finished_ = true;
+  gone_.NotifyAll();
   FATHOM_RETURN_IF_ERROR(WaitUntil([&]() FATHOM_REQUIRES(mutex_) {
     return durable_ >= spool_->last_sequence();
   }));

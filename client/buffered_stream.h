@@ -13,12 +13,18 @@
 // sent again. A buffer that an earlier process left behind is sent first, and
 // new messages go on in its numbering.
 //
+// A power cut at the sender loses what came since the last sync, a second's at
+// most. No message is sent before it is synced: its number would be given
+// again, and the server would take the next message for it. One sync serves
+// all that wait, and no caller waits for it.
+//
 // A full buffer: the caller says whether Send waits for room (a recording can
 // wait) or drops the new message and counts it (the sea does not). What was
 // taken is never dropped.
 //
 // Thread safety: all methods may be called from several threads.
-// Lock order: none other is taken with mutex_.
+// Lock order: none other is taken with mutex_; no call on the stream is made
+// with it.
 
 #ifndef FATHOM_CLIENT_BUFFERED_STREAM_H_
 #define FATHOM_CLIENT_BUFFERED_STREAM_H_
@@ -110,8 +116,12 @@ class BufferedStream {
   void Step(Message& message, bool& holds);
   // Notes how a call on the stream ended.
   void Note(const absl::Status& status) FATHOM_REQUIRES(mutex_);
-  // What the server has leaves the buffer.
-  void ReleaseDurable() FATHOM_REQUIRES(mutex_);
+  // What the server has, everything up to `durable`, leaves the buffer.
+  void ReleaseDurable(std::uint64_t durable) FATHOM_REQUIRES(mutex_);
+  // Syncs for the next message that is sent, or when it is time to.
+  absl::Status SyncInTime(bool holds) FATHOM_REQUIRES(mutex_);
+  // This ends everything.
+  void Fail(const absl::Status& status) FATHOM_REQUIRES(mutex_);
   // Waits until `done`, as long as the server goes on making things durable.
   absl::Status WaitUntil(const std::function<bool()>& done)
       FATHOM_REQUIRES(mutex_);
@@ -137,9 +147,9 @@ class BufferedStream {
   absl::Status failed_ FATHOM_GUARDED_BY(mutex_);
   bool finished_ FATHOM_GUARDED_BY(mutex_) = false;
   bool stop_ FATHOM_GUARDED_BY(mutex_) = false;
-  // Messages since the last look at what is durable, and since the last sync.
-  int since_look_ FATHOM_GUARDED_BY(mutex_) = 0;
   std::chrono::steady_clock::time_point synced_ FATHOM_GUARDED_BY(mutex_);
+  // The thread's: messages since it looked at what is durable.
+  int since_look_ = 0;
   std::thread thread_;
 };
 

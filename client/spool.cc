@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -30,8 +29,6 @@ constexpr std::size_t kFrameBytes = 8;
 // A segment is an eighth of the whole, at most this: small enough that room
 // comes back soon, large enough that files are few.
 constexpr std::uint64_t kMostSegmentBytes = 8u << 20;
-// A segment that the server has whole is left behind only from this size on.
-constexpr std::uint64_t kWorthLeavingBytes = 1u << 15;
 constexpr std::size_t kReadBytes = 1u << 18;
 
 template <typename Word>
@@ -115,6 +112,23 @@ absl::Status SyncFolder(const std::string& folder) {
   return synced ? absl::OkStatus() : DiskError("sync", folder);
 }
 
+// Makes the folder and those above it, on disk too.
+absl::Status MakeFolder(const std::filesystem::path& folder) {
+  std::error_code error;
+  if (folder.empty() || std::filesystem::is_directory(folder, error)) {
+    return absl::OkStatus();
+  }
+  const std::filesystem::path parent = folder.parent_path();
+  FATHOM_RETURN_IF_ERROR(MakeFolder(parent));
+  if (!std::filesystem::create_directory(folder, error)) {
+    // "a/" was made as "a".
+    if (!error) return absl::OkStatus();
+    return absl::PermissionDeniedError(absl::StrFormat(
+        "cannot make the folder %s: %s", folder.string(), error.message()));
+  }
+  return SyncFolder(parent.empty() ? "." : parent.string());
+}
+
 struct Header {
   std::uint64_t epoch;
   std::uint64_t first;
@@ -162,6 +176,23 @@ Frame LookAtFrame(std::string_view bytes, std::size_t& size) {
              : Frame::kDamaged;
 }
 
+// Whether these bytes at the end of the last segment, which begin with no
+// whole message, are all that is left of one: at most zeros are behind it (a
+// power cut that spared the file's size), and no whole message in it (a size
+// that was damaged).
+bool IsTornEnd(std::string_view bytes) {
+  // npos + 1 is 0.
+  const std::size_t used = bytes.find_last_not_of('\0') + 1;
+  if (used <= kFrameBytes) return true;
+  const std::size_t size = GetWord<std::uint32_t>(bytes.data());
+  if (size > kMostSpoolMessageBytes || used > kFrameBytes + size) return false;
+  for (; !bytes.empty(); bytes.remove_prefix(1)) {
+    std::size_t ignored = 0;
+    if (LookAtFrame(bytes, ignored) == Frame::kWhole) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 Spool::Spool(const SpoolOptions& options)
@@ -193,11 +224,7 @@ absl::StatusOr<std::unique_ptr<Spool>> Spool::Open(
       !std::filesystem::is_directory(options.folder, error)) {
     return NothingThere(options);
   }
-  std::filesystem::create_directories(options.folder, error);
-  if (error) {
-    return absl::PermissionDeniedError(absl::StrFormat(
-        "cannot make the folder %s: %s", options.folder, error.message()));
-  }
+  FATHOM_RETURN_IF_ERROR(MakeFolder(options.folder));
   std::unique_ptr<Spool> spool(new Spool(options));
   FATHOM_RETURN_IF_ERROR(spool->Lock());
   FATHOM_RETURN_IF_ERROR(spool->OpenSegments());
@@ -219,12 +246,17 @@ absl::Status Spool::Lock() {
 absl::Status Spool::OpenSegments() {
   std::vector<std::string> paths;
   std::error_code error;
-  for (const auto& entry :
-       std::filesystem::directory_iterator(options_.folder, error)) {
-    const std::string name = entry.path().filename().string();
+  std::filesystem::directory_iterator entry(options_.folder, error);
+  for (; !error && entry != std::filesystem::directory_iterator();
+       entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
     if (name.starts_with(options_.kind + "-") && name.ends_with(".spool")) {
-      paths.push_back(entry.path().string());
+      paths.push_back(entry->path().string());
     }
+  }
+  if (error) {
+    return absl::DataLossError(absl::StrFormat(
+        "cannot read the folder %s: %s", options_.folder, error.message()));
   }
   // Numbers of 20 digits: in order of name is in order of number.
   std::sort(paths.begin(), paths.end());
@@ -251,20 +283,23 @@ absl::Status Spool::OpenSegments() {
   }
   const std::string& path = segments_.back().path;
   append_ = ::open(path.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
-  return append_ >= 0 ? absl::OkStatus() : DiskError("open", path);
+  if (append_ < 0) return DiskError("open", path);
+  // Who wrote it may have been killed before it synced.
+  FATHOM_RETURN_IF_ERROR(Sync());
+  return SyncFolder(options_.folder);
 }
 
 absl::Status Spool::Scan(Segment& segment, bool last) {
   const int file = ::open(segment.path.c_str(), O_RDWR | O_CLOEXEC);
   if (file < 0) return DiskError("open", segment.path);
-  // At most kMostSegmentBytes and one message.
   std::string bytes;
-  struct stat about = {};
-  const bool read =
-      ::fstat(file, &about) == 0 &&
-      ReadMore(file, 0, static_cast<std::size_t>(about.st_size), bytes);
+  // One byte more than any has shows one that is too large.
+  const bool read = ReadMore(file, 0, kMostSegmentBytes + 1, bytes);
   absl::Status status =
       read ? absl::OkStatus() : DiskError("read", segment.path);
+  if (status.ok() && bytes.size() > kMostSegmentBytes) {
+    status = Damaged(segment.path, kMostSegmentBytes);
+  }
   const std::optional<Header> header = DecodeHeader(bytes);
   if (status.ok() && !header.has_value()) status = Damaged(segment.path, 0);
   if (status.ok()) {
@@ -280,13 +315,13 @@ absl::Status Spool::Scan(Segment& segment, bool last) {
   }
   while (status.ok() && segment.bytes < bytes.size()) {
     std::size_t size = 0;
-    if (LookAtFrame(std::string_view(bytes).substr(segment.bytes), size) ==
-        Frame::kWhole) {
+    const std::string_view rest = std::string_view(bytes).substr(segment.bytes);
+    if (LookAtFrame(rest, size) == Frame::kWhole) {
       segment.bytes += kFrameBytes + size;
       ++segment.count;
       continue;
     }
-    if (!last) {
+    if (!last || !IsTornEnd(rest)) {
       status = Damaged(segment.path, segment.bytes);
     } else if (::ftruncate(file, static_cast<off_t>(segment.bytes)) != 0) {
       status = DiskError("cut off the torn end of", segment.path);
@@ -305,7 +340,7 @@ absl::Status Spool::StartSegment(std::uint64_t first) {
                   .bytes = kHeaderBytes};
   const int file =
       ::open(segment.path.c_str(),
-             O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC, 0644);
+             O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644);
   if (file < 0) return DiskError("make", segment.path);
   absl::Status status;
   if (!WriteWhole(
@@ -322,6 +357,7 @@ absl::Status Spool::StartSegment(std::uint64_t first) {
   }
   if (append_ >= 0) ::close(append_);
   append_ = file;
+  synced_ = first - 1;
   bytes_ += segment.bytes;
   segments_.push_back(std::move(segment));
   return absl::OkStatus();
@@ -334,6 +370,7 @@ bool Spool::HasRoom(std::size_t message_bytes) const {
 }
 
 absl::Status Spool::Append(std::string_view message) {
+  FATHOM_RETURN_IF_ERROR(broken_);
   if (!HasRoom(message.size())) {
     return absl::ResourceExhaustedError(
         absl::StrFormat("the buffer %s is full: %d of %d bytes",
@@ -352,14 +389,14 @@ absl::Status Spool::Append(std::string_view message) {
     absl::Status status = DiskError("write", segment.path);
     // No half message may stand before the next one.
     if (::ftruncate(append_, static_cast<off_t>(segment.bytes)) != 0) {
-      return absl::DataLossError(std::string(status.message()));
+      broken_ = absl::DataLossError(status.message());
+      return broken_;
     }
     return status;
   }
   segment.bytes += frame.size();
   bytes_ += frame.size();
   ++segment.count;
-  unsynced_ = true;
   return absl::OkStatus();
 }
 
@@ -408,8 +445,8 @@ absl::StatusOr<bool> Spool::Read(std::string& message) {
 
 absl::Status Spool::Release(std::uint64_t sequence) {
   const Segment& growing = segments_.back();
-  if (sequence + 1 >= growing.end() && growing.count > 0 &&
-      growing.bytes > kWorthLeavingBytes) {
+  // A new one costs syncs: not for a few messages.
+  if (sequence + 1 >= growing.end() && growing.bytes >= segment_bytes_ / 2) {
     FATHOM_RETURN_IF_ERROR(StartSegment(growing.end()));
   }
   while (segments_.size() > 1 && segments_.front().end() <= sequence + 1) {
@@ -431,12 +468,32 @@ absl::Status Spool::Clear() {
 }
 
 absl::Status Spool::Sync() {
-  if (!unsynced_) return absl::OkStatus();
-  if (::fdatasync(append_) != 0) {
-    return DiskError("sync", segments_.back().path);
+  if (!broken_.ok() || synced_ == last_sequence()) return broken_;
+  return NoteSync(last_sequence(), ::fdatasync(append_) == 0);
+}
+
+absl::Status Spool::SyncUnlocked(Mutex& mutex) {
+  if (!broken_.ok() || synced_ == last_sequence()) return broken_;
+  const std::uint64_t sequence = last_sequence();
+  // Of our own: an Append may close append_ meanwhile.
+  const int file = ::fcntl(append_, F_DUPFD_CLOEXEC, 0);
+  mutex.Unlock();
+  const bool ok = file >= 0 && ::fdatasync(file) == 0;
+  const int error = errno;
+  if (file >= 0) ::close(file);
+  mutex.Lock();
+  errno = error;
+  return NoteSync(sequence, ok);
+}
+
+absl::Status Spool::NoteSync(std::uint64_t sequence, bool ok) {
+  if (ok) {
+    synced_ = std::max(synced_, sequence);
+  } else if (broken_.ok()) {
+    broken_ =
+        absl::DataLossError(DiskError("sync", segments_.back().path).message());
   }
-  unsynced_ = false;
-  return absl::OkStatus();
+  return broken_;
 }
 
 }  // namespace fathom::client

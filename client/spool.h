@@ -13,9 +13,14 @@
 // outlive the sender: at least one segment stays.
 //
 // What survives: every message that Append took outlives the death of the
-// process; a power cut loses what was appended since Sync, which Append calls
-// for a whole segment. A message torn by either is cut off when the spool is
-// opened again. Damage before that is refused (DATA_LOSS), never skipped.
+// process; a power cut spares the messages up to synced_sequence(). A cut
+// message's number is given again: only what was synced may be sent, or the
+// server takes the new message for the old one. Append syncs a whole segment,
+// Open what it finds.
+//
+// A message torn by either is cut off when the spool is opened again: one in
+// the last segment behind which there are at most zeros. All other damage is
+// refused (DATA_LOSS), never skipped.
 //
 // Bounded: the segments never hold more than max_bytes together.
 // Cost: one write(2) a message. Thread safety: none.
@@ -32,6 +37,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "base/mutex.h"
 
 namespace fathom::client {
 
@@ -49,8 +55,10 @@ struct SpoolOptions {
   std::uint64_t max_bytes = 256u << 20;
 };
 
-// Holds a message of any size that the server takes (4 MiB), once the server
-// has what came before it.
+// The largest message that the server takes.
+inline constexpr std::size_t kMostSpoolMessageBytes = 4u << 20;
+
+// Holds a message of any size, once the server has what came before it.
 inline constexpr std::uint64_t kLeastSpoolBytes = 16u << 20;
 
 class Spool {
@@ -78,8 +86,8 @@ class Spool {
   bool HasRoom(std::size_t message_bytes) const;
 
   // Writes the message under the number last_sequence() + 1. REQUIRES: not
-  // empty. Errors: RESOURCE_EXHAUSTED (no room, or a full disk: nothing was
-  // written), DATA_LOSS (the disk failed).
+  // empty, at most kMostSpoolMessageBytes. Errors: RESOURCE_EXHAUSTED (no room,
+  // or a full disk: nothing was written), DATA_LOSS (the disk failed).
   absl::Status Append(std::string_view message);
 
   // The next message in order, from first_sequence() on; false: there is none
@@ -94,8 +102,14 @@ class Spool {
   // send. REQUIRES: everything was released. Errors: as Release.
   absl::Status Clear();
 
-  // What was appended survives a power cut from here on.
+  // Every message up to this number survives a power cut.
+  std::uint64_t synced_sequence() const { return synced_; }
+  // What was appended survives a power cut from here on. Errors: DATA_LOSS,
+  // and from then on always: nobody knows what the disk has.
   absl::Status Sync();
+  // The same, for a spool that `mutex` guards: others have it while the disk
+  // works. REQUIRES: the spool is not destroyed meanwhile.
+  absl::Status SyncUnlocked(Mutex& mutex) FATHOM_REQUIRES(mutex);
 
  private:
   struct Segment {
@@ -115,6 +129,8 @@ class Spool {
   absl::Status Scan(Segment& segment, bool last);
   // Makes an empty segment behind the others the one that grows.
   absl::Status StartSegment(std::uint64_t first);
+  // How a sync of what was there up to `sequence` ended; errno is its error.
+  absl::Status NoteSync(std::uint64_t sequence, bool ok);
 
   const SpoolOptions options_;
   const std::uint64_t segment_bytes_;
@@ -126,7 +142,9 @@ class Spool {
   std::uint64_t bytes_ = 0;
   // Of the last segment.
   int append_ = -1;
-  bool unsynced_ = false;
+  std::uint64_t synced_ = 0;
+  // A sync failed, or half a message stands at the end.
+  absl::Status broken_;
   // The reader's place: in the segment that holds next_read_.
   std::uint64_t next_read_ = 0;
   int read_ = -1;

@@ -235,7 +235,8 @@ CLI::Option* AddLink(CLI::App& app, LinkOptions& link,
       app.add_option("--buffer", link.buffer,
                      "Keep messages in this folder until the server has them: "
                      "the run goes on while it is away, and what is left is "
-                     "sent by the next run with this folder, or by `send`")
+                     "sent by the next run with this folder, or by `send`; a "
+                     "fleet has one for each vehicle, FOLDER/ID-N")
           ->type_name("FOLDER")
           ->needs(server);
   app.add_option("--buffer-mib", link.buffer_mib,

@@ -6,7 +6,10 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <thread>
+#include <vector>
 
+#include "tests/client/failing_sync.h"
 #include "tests/client/fake_server.h"
 #include "tests/testing/status_matchers.h"
 
@@ -62,6 +65,26 @@ class BufferedStreamTest : public ::testing::Test {
       FATHOM_ASSERT_OK_AND_ASSIGN(const bool taken, stream.Send(ping));
       ASSERT_TRUE(taken);
     }
+  }
+
+  // Sends until there is no room for one more; the server must be away. How
+  // many that were.
+  static std::uint64_t Fill(BufferedPingStream& stream) {
+    v1::Ping ping = MakePing();
+    const std::uint64_t one = ping.ByteSizeLong() + 200;
+    while (stream.state().bytes + one <= kLeastSpoolBytes) {
+      FATHOM_EXPECT_OK(stream.Send(ping));
+    }
+    // Those that are too small for the room of another ping.
+    ping.clear_range_m();
+    ping.clear_bearing_deg();
+    ping.clear_depth_m();
+    ping.clear_std_m();
+    const std::uint64_t small = ping.ByteSizeLong() + 200;
+    while (stream.state().bytes + small <= kLeastSpoolBytes) {
+      FATHOM_EXPECT_OK(stream.Send(ping));
+    }
+    return stream.state().waiting;
   }
 
   void ExpectEachOnce(std::uint64_t last) {
@@ -157,15 +180,59 @@ TEST_F(BufferedStreamTest, OrWaitsForRoomAndThenGivesUp) {
   EXPECT_EQ(stream->state().waiting, taken);
 }
 
+TEST_F(BufferedStreamTest, WhatAPowerCutWouldTakeBackIsNotSent) {
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto stream, Open());
+  const FailingSync failing;
+  Send(*stream, 1);
+  EXPECT_THAT(stream->Finish(), StatusIs(absl::StatusCode::kDataLoss));
+  EXPECT_EQ(server_.pings.messages_received(), 0u);
+}
+
+TEST_F(BufferedStreamTest, SendersThatWaitForRoomDoNotShareANumber) {
+  server_.Stop();
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto stream, Open());
+  const std::uint64_t full = Fill(*stream);
+  std::vector<std::thread> senders;
+  for (int i = 0; i < 4; ++i) {
+    senders.emplace_back([&] { Send(*stream, 5); });
+  }
+  // What they do before the server comes changes nothing but the proof.
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  server_.Start();
+  for (std::thread& sender : senders) sender.join();
+  FATHOM_ASSERT_OK(stream->Finish());
+  ExpectEachOnce(full + 20);
+}
+
+TEST_F(BufferedStreamTest, ASenderThatWaitsForRoomLearnsOfTheEnd) {
+  server_.Stop();
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto stream, Open());
+  const std::uint64_t full = Fill(*stream);
+  std::thread sender([&] {
+    v1::Ping ping = MakePing();
+    EXPECT_THAT(stream->Send(ping).status(),
+                StatusIs(absl::StatusCode::kFailedPrecondition));
+  });
+  std::thread finisher([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    FATHOM_EXPECT_OK(stream->Finish());
+  });
+  sender.join();
+  server_.Start();
+  finisher.join();
+  ExpectEachOnce(full);
+}
+
 TEST_F(BufferedStreamTest, WhatNoPatienceMendsEndsIt) {
   server_.pings.CutAfter(
       10, grpc::Status(grpc::StatusCode::INVALID_ARGUMENT, "no such thing"),
       false);
   FATHOM_ASSERT_OK_AND_ASSIGN(const auto stream, Open());
-  Send(*stream, 20);
+  v1::Ping ping = MakePing();
+  // The end may come before the last of them.
+  for (int i = 0; i < 20; ++i) (void)stream->Send(ping);
   EXPECT_THAT(stream->Finish(), StatusIs(absl::StatusCode::kInvalidArgument,
                                          HasSubstr("no such thing")));
-  v1::Ping ping = MakePing();
   EXPECT_FALSE(stream->Send(ping).ok());
 }
 

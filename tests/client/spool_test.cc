@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
@@ -10,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/client/failing_sync.h"
 #include "tests/testing/status_matchers.h"
 
 namespace fathom::client {
@@ -146,6 +148,93 @@ TEST_F(SpoolTest, ATornEndIsCutOffAndTheRestIsThere) {
   std::ofstream(folder_ + "/pings-00000000000000000099.spool") << "FTHM";
   FATHOM_EXPECT_OK(Open());
   EXPECT_EQ(Segments().size(), 1u);
+}
+
+TEST_F(SpoolTest, DamageBeforeTheLastMessageIsNoTornEnd) {
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
+    for (const char* text : {"first", "second", "third"}) {
+      FATHOM_ASSERT_OK(spool->Append(text));
+    }
+  }
+  const std::string path = Segments().back();
+  const auto size = std::filesystem::file_size(path);
+  // 92 bytes of header, then 8 before each message: its text, its checksum;
+  // its size made larger than the file, than a message, and none.
+  for (const auto& [at, flip] :
+       {std::pair{92 + 8, 1}, {92 + 4, 1}, {92, 64}, {92 + 3, 64}, {92, 5}}) {
+    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekg(at);
+    const int good = file.get();
+    file.seekp(at);
+    file.put(static_cast<char>(good ^ flip)).flush();
+    EXPECT_THAT(Open(), StatusIs(absl::StatusCode::kDataLoss,
+                                 HasSubstr("damaged at byte 92")))
+        << at;
+    EXPECT_EQ(std::filesystem::file_size(path), size);
+    file.seekp(at);
+    file.put(static_cast<char>(good));
+  }
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
+  EXPECT_EQ(ReadAll(*spool).size(), 3u);
+}
+
+TEST_F(SpoolTest, AFileLargerThanAnyOfOursIsNotRead) {
+  FATHOM_ASSERT_OK(Open());
+  // 1 TiB of holes.
+  std::filesystem::resize_file(Segments().back(), std::uintmax_t{1} << 40);
+  EXPECT_THAT(Open(), StatusIs(absl::StatusCode::kDataLoss));
+}
+
+TEST_F(SpoolTest, WhatAKilledProcessLeftIsSyncedWhenOpened) {
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
+    FATHOM_ASSERT_OK(spool->Append("dirty"));
+    EXPECT_EQ(spool->synced_sequence(), 0u);
+  }
+  {
+    const FailingSync failing;
+    EXPECT_THAT(Open(), StatusIs(absl::StatusCode::kDataLoss));
+  }
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
+  EXPECT_EQ(spool->synced_sequence(), 1u);
+}
+
+TEST_F(SpoolTest, ASyncThatFailedIsNotMendedByTheNext) {
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
+  FATHOM_ASSERT_OK(spool->Append("a"));
+  {
+    const FailingSync failing;
+    EXPECT_THAT(spool->Sync(), StatusIs(absl::StatusCode::kDataLoss));
+  }
+  EXPECT_THAT(spool->Sync(), StatusIs(absl::StatusCode::kDataLoss));
+  EXPECT_THAT(spool->Append("b"), StatusIs(absl::StatusCode::kDataLoss));
+  EXPECT_EQ(spool->synced_sequence(), 0u);
+}
+
+TEST_F(SpoolTest, MakesItsFolderAndThoseAbove) {
+  const std::string root = folder_;
+  for (const char* below : {"/a/b", "/a/b/c/"}) {
+    folder_ = root + below;
+    FATHOM_EXPECT_OK(Open());
+    EXPECT_EQ(Segments().size(), 1u);
+  }
+  folder_ = root;
+}
+
+TEST_F(SpoolTest, AFewMessagesThatTheServerHasCostNoSegment) {
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
+  const std::string path = Segments().back();
+  // A segment is 2 MiB; it is left behind from the half on.
+  const std::string message(100 << 10, 'x');
+  for (std::uint64_t i = 1; i <= 10; ++i) {
+    FATHOM_ASSERT_OK(spool->Append(message));
+    FATHOM_ASSERT_OK(spool->Release(i));
+    EXPECT_EQ(Segments(), std::vector<std::string>{path});
+  }
+  FATHOM_ASSERT_OK(spool->Append(message));
+  FATHOM_ASSERT_OK(spool->Release(11));
+  EXPECT_EQ(spool->bytes(), 92u);
 }
 
 TEST_F(SpoolTest, DamageIsRefusedAndChangedByNobody) {
