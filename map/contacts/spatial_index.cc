@@ -373,7 +373,8 @@ bool SpatialIndex::Change(const Contact* contact, std::uint64_t code,
 void SpatialIndex::ForEachCandidate(
     const GeodeticPoint& point, double reach_m, Time t,
     absl::FunctionRef<void(const Contact&)> visit) const {
-  if (top_ == nullptr) return;
+  // A move leaves top_ behind.
+  if (root_ == nullptr || top_ == nullptr) return;
   const UnitVector at = QuickUnitVector(point);
   // Depth first; at most three siblings wait on each level.
   std::array<const Node*, 3 * kLevels + 4> waiting;
