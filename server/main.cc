@@ -111,7 +111,7 @@ void AddFlags(CLI::App& app, Flags& flags) {
 
   const char* const kHistory = "The contact history (all is kept by default)";
   app.add_option("--history-max-age-days", flags.history_max_age_days,
-                 "Estimates older than this beside the newest evidence are "
+                 "Estimates older than this beside the newest estimate are "
                  "forgotten, a block at a time, with each checkpoint")
       ->check(CLI::Range(1e-3, kMaxHistoryAgeDays))
       ->group(kHistory)

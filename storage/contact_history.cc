@@ -22,11 +22,14 @@ std::size_t BlocksFor(std::size_t rows) {
 absl::StatusOr<std::unique_ptr<ContactHistory>> ContactHistory::Create(
     Connection& connection, ContactTable& contacts) {
   FATHOM_ASSIGN_OR_RETURN(HistoryTable table, HistoryTable::Create(connection));
+  FATHOM_RETURN_IF_ERROR(table.ReloadTotal());
   return std::unique_ptr<ContactHistory>(
       new ContactHistory(std::move(table), contacts));
 }
 
-absl::Status ContactHistory::Adopt(const std::vector<ContactHistoryRow>& rows) {
+absl::StatusOr<ContactHistory::Tails> ContactHistory::MakeTails(
+    HistoryTable& table, ContactTable& contacts,
+    const std::vector<ContactHistoryRow>& rows) {
   Tails tails;
   std::unordered_map<map::ContactKey, std::uint64_t> newest;
   for (const ContactHistoryRow& row : rows) {
@@ -34,15 +37,20 @@ absl::Status ContactHistory::Adopt(const std::vector<ContactHistoryRow>& rows) {
     auto known = newest.find(key);
     if (known == newest.end()) {
       FATHOM_ASSIGN_OR_RETURN(const std::optional<std::int64_t> number,
-                              contacts_.FindNumber(key));
+                              contacts.FindNumber(key));
       std::uint64_t revision = 0;
       if (number.has_value()) {
-        FATHOM_ASSIGN_OR_RETURN(revision, table_.NewestRevision(*number));
+        FATHOM_ASSIGN_OR_RETURN(revision, table.NewestRevision(*number));
       }
       known = newest.emplace(key, revision).first;
     }
     if (row.revision > known->second) tails[key].Add(row);
   }
+  return tails;
+}
+
+absl::Status ContactHistory::Adopt(const std::vector<ContactHistoryRow>& rows) {
+  FATHOM_ASSIGN_OR_RETURN(Tails tails, MakeTails(table_, contacts_, rows));
   full_.clear();
   for (const auto& [key, tail] : tails) {
     if (tail.rows.size() >= kBlockEstimates) full_.push_back(key);
@@ -75,7 +83,7 @@ absl::Status ContactHistory::Write(std::span<const ContactHistoryRow> rows,
     Tails last;
     Add(rows, last);
     FATHOM_RETURN_IF_ERROR(WriteAll(last));
-    return table_.Forget(limits, checkpoint->now->as_of());
+    return table_.Forget(limits);
   }
   const std::size_t blocks = std::min(full_.size(), BlocksFor(rows.size()));
   for (; written_ < blocks; ++written_) {

@@ -34,9 +34,17 @@ namespace fathom::storage {
 
 class ContactHistory {
  public:
+  using Tails = std::unordered_map<map::ContactKey, HistoryTail>;
+
   // `connection`, the writing one, and `contacts` must outlive it.
   static absl::StatusOr<std::unique_ptr<ContactHistory>> Create(
       Connection& connection, ContactTable& contacts);
+
+  // Of `rows`, what a replay of the journal made (history_replay.h), the tails
+  // of what the blocks do not hold.
+  static absl::StatusOr<Tails> MakeTails(
+      HistoryTable& table, ContactTable& contacts,
+      const std::vector<ContactHistoryRow>& rows);
 
   // Takes what a replay of the journal made (history_replay.h), but what the
   // blocks hold already, in place of what it has.
@@ -61,8 +69,6 @@ class ContactHistory {
   const HistoryTotal& total() const { return table_.total(); }
 
  private:
-  using Tails = std::unordered_map<map::ContactKey, HistoryTail>;
-
   ContactHistory(HistoryTable table, ContactTable& contacts)
       : table_(std::move(table)), contacts_(contacts) {}
   absl::Status WriteAll(const Tails& tails);

@@ -1,6 +1,6 @@
 #include "storage/history_reader.h"
 
-#include <algorithm>
+#include <map>
 #include <optional>
 #include <utility>
 
@@ -14,19 +14,29 @@
 namespace fathom::storage {
 namespace {
 
-absl::StatusOr<std::vector<map::ContactKey>> AllContacts(
-    Connection& connection) {
-  FATHOM_ASSIGN_OR_RETURN(
-      Statement select,
-      connection.Prepare("SELECT source_id, contact_id FROM contact ORDER BY "
-                         "source_id, contact_id"));
-  std::vector<map::ContactKey> keys;
-  while (true) {
-    FATHOM_ASSIGN_OR_RETURN(const bool more, select.Step());
-    if (!more) return keys;
-    keys.push_back(
-        {.source = {select.ColumnText(0)}, .contact = {select.ColumnText(1)}});
+using Damaged = std::function<absl::Status(const absl::Status&)>;
+
+// The numbers of all contacts; where the table or its index is damaged, of
+// those that the other tells, too.
+absl::StatusOr<std::map<map::ContactKey, std::int64_t>> AllContacts(
+    Connection& connection, const Damaged& damaged) {
+  std::map<map::ContactKey, std::int64_t> numbers;
+  for (const char* way : {"ORDER BY source_id, contact_id", "NOT INDEXED"}) {
+    FATHOM_ASSIGN_OR_RETURN(
+        Statement select,
+        connection.Prepare(absl::StrFormat(
+            "SELECT source_id, contact_id, contact_number FROM contact %s",
+            way)));
+    absl::StatusOr<bool> more;
+    while ((more = select.Step()).ok() && *more) {
+      numbers[{.source = {select.ColumnText(0)},
+               .contact = {select.ColumnText(1)}}] = select.ColumnInt(2);
+    }
+    if (more.ok()) return numbers;
+    if (!absl::IsDataLoss(more.status())) return more.status();
+    FATHOM_RETURN_IF_ERROR(damaged(more.status()));
   }
+  return numbers;
 }
 
 }  // namespace
@@ -50,7 +60,7 @@ absl::Status ReadHistory(
 
 absl::StatusOr<std::vector<ContactHistoryRow>> ReadHistoryIn(
     Connection& connection, const HistoryArea& area, const HistoryTails& tails,
-    Time from, Time to, std::size_t max_rows) {
+    Time from, Time to, std::size_t max_rows, const std::atomic<bool>* stop) {
   FATHOM_ASSIGN_OR_RETURN(const std::vector<HistoryBlocks> found,
                           FindBlocksIn(connection, area, from, to));
   std::map<map::ContactKey, HistoryBlocks> contacts;
@@ -60,7 +70,9 @@ absl::StatusOr<std::vector<ContactHistoryRow>> ReadHistoryIn(
   }
   for (const HistoryBlocks& blocks : found) contacts[blocks.key] = blocks;
   std::vector<ContactHistoryRow> rows;
+  const auto stopped = [stop] { return stop != nullptr && *stop; };
   const auto visit = [&](const ContactHistoryRow& row) {
+    if (stopped()) return false;
     if (!area.Holds(row.estimate.Position())) return true;
     rows.push_back(row);
     return rows.size() <= max_rows;
@@ -72,6 +84,7 @@ absl::StatusOr<std::vector<ContactHistoryRow>> ReadHistoryIn(
         const bool all,
         ReadBlocks(connection, blocks,
                    tail == tails.end() ? none : tail->second, from, to, visit));
+    if (stopped()) return absl::CancelledError("stopped");
     if (!all) {
       return absl::ResourceExhaustedError(
           absl::StrFormat("more than max_rows=%d estimates", max_rows));
@@ -85,12 +98,10 @@ absl::StatusOr<HistoryTails> FindTails(
   HistoryTails tails;
   FATHOM_ASSIGN_OR_RETURN(ContactTable contacts,
                           ContactTable::Create(connection));
-  FATHOM_ASSIGN_OR_RETURN(const auto history,
-                          ContactHistory::Create(connection, contacts));
-  FATHOM_RETURN_IF_ERROR(history->Adopt(replayed));
-  for (const map::ContactKey& key : history->Contacts()) {
-    tails[key] = history->Tail(key);
-  }
+  FATHOM_ASSIGN_OR_RETURN(HistoryTable table, HistoryTable::Create(connection));
+  FATHOM_ASSIGN_OR_RETURN(ContactHistory::Tails made,
+                          ContactHistory::MakeTails(table, contacts, replayed));
+  for (auto& [key, tail] : made) tails[key] = std::move(tail);
   return tails;
 }
 
@@ -140,16 +151,17 @@ absl::Status ReadWholeHistory(
   if (version < kFirstBlockVersion) {
     return ReadOldHistory(connection, "contact_history", visit, damaged);
   }
+  FATHOM_ASSIGN_OR_RETURN(auto numbers, AllContacts(connection, damaged));
+  // What is behind the blocks is less than what is in them.
   absl::StatusOr<HistoryTails> tails = FindTails(connection, replayed);
-  absl::StatusOr<std::vector<map::ContactKey>> keys = AllContacts(connection);
-  for (const absl::Status& status : {tails.status(), keys.status()}) {
-    if (status.ok()) continue;
-    return absl::IsDataLoss(status) ? damaged(status) : status;
+  if (!tails.ok()) {
+    if (!absl::IsDataLoss(tails.status())) return tails.status();
+    FATHOM_RETURN_IF_ERROR(damaged(tails.status()));
+    tails = HistoryTails();
   }
-  for (const auto& [key, tail] : *tails) keys->push_back(key);
-  std::sort(keys->begin(), keys->end());
-  keys->erase(std::unique(keys->begin(), keys->end()), keys->end());
-  for (const map::ContactKey& key : *keys) {
+  constexpr std::int64_t kNone = -1;
+  for (const auto& [key, tail] : *tails) numbers.emplace(key, kNone);
+  for (const auto& [key, number] : numbers) {
     absl::Status status;
     const auto tell = [&](const ContactHistoryRow& row) {
       status = visit(row);
@@ -164,21 +176,20 @@ absl::Status ReadWholeHistory(
       return absl::IsDataLoss(all.status()) ? damaged(all.status())
                                             : all.status();
     };
-    const auto blocks = FindBlocks(connection, key, Time::min(), Time::max());
-    if (absl::IsDataLoss(blocks.status())) {
-      FATHOM_RETURN_IF_ERROR(damaged(blocks.status()));
-    } else {
-      FATHOM_RETURN_IF_ERROR(blocks.status());
-    }
-    HistoryBlocks one{.contact_number = 0, .key = key, .block_ids = {}};
+    HistoryBlocks one{.contact_number = number, .key = key, .block_ids = {}};
     HistoryTail tail = std::exchange((*tails)[key], {});
-    if (blocks.ok() && blocks->has_value()) {
-      one.contact_number = (*blocks)->contact_number;
-      HistoryTail cut{.rows = {}, .cut = tail.cut};
-      for (const std::int64_t block_id : (*blocks)->block_ids) {
+    const auto blocks =
+        FindBlocksOf(connection, number, key, Time::min(), Time::max());
+    if (blocks.ok()) {
+      const HistoryTail cut{.rows = {}, .cut = tail.cut};
+      for (const std::int64_t block_id : blocks->block_ids) {
         one.block_ids = {block_id};
         FATHOM_RETURN_IF_ERROR(read(one, cut));
       }
+    } else if (absl::IsDataLoss(blocks.status())) {
+      FATHOM_RETURN_IF_ERROR(damaged(blocks.status()));
+    } else {
+      return blocks.status();
     }
     one.block_ids.clear();
     FATHOM_RETURN_IF_ERROR(read(one, tail));

@@ -6,6 +6,7 @@
 #ifndef FATHOM_STORAGE_HISTORY_READER_H_
 #define FATHOM_STORAGE_HISTORY_READER_H_
 
+#include <atomic>
 #include <cstddef>
 #include <functional>
 #include <map>
@@ -36,7 +37,7 @@ absl::Status ReadHistory(
 // See MissionFile::ReadContactHistoryIn.
 absl::StatusOr<std::vector<ContactHistoryRow>> ReadHistoryIn(
     Connection& connection, const HistoryArea& area, const HistoryTails& tails,
-    Time from, Time to, std::size_t max_rows);
+    Time from, Time to, std::size_t max_rows, const std::atomic<bool>* stop);
 
 // What the journal of a file that nobody serves adds to its blocks: see
 // history_replay.h. The file is not changed.

@@ -74,15 +74,6 @@ HistoryBlockMark MarkOf(std::span<const ContactHistoryRow> rows) {
   return mark;
 }
 
-bool HistoryArea::Holds(const map::GeodeticPoint& point) const {
-  if (point.latitude_deg < south_deg || point.latitude_deg > north_deg) {
-    return false;
-  }
-  const bool from_west = point.longitude_deg >= west_deg;
-  const bool to_east = point.longitude_deg <= east_deg;
-  return west_deg <= east_deg ? from_west && to_east : from_west || to_east;
-}
-
 absl::StatusOr<HistoryTable> HistoryTable::Create(Connection& connection) {
   HistoryTable table;
   const auto prepare = [&connection](Statement& out,
@@ -118,6 +109,8 @@ absl::StatusOr<HistoryTable> HistoryTable::Create(Connection& connection) {
       table.oldest_,
       "SELECT block_id, estimate_count, length(content), last_time_us FROM "
       "contact_history ORDER BY last_time_us LIMIT ?"));
+  FATHOM_RETURN_IF_ERROR(
+      prepare(table.newest_, "SELECT max(last_time_us) FROM contact_history"));
   FATHOM_RETURN_IF_ERROR(prepare(
       table.place_,
       "SELECT south_deg <= ? AND north_deg >= ? AND west_deg <= ? AND east_deg "
@@ -131,7 +124,6 @@ absl::StatusOr<HistoryTable> HistoryTable::Create(Connection& connection) {
       prepare(table.read_total_,
               "SELECT estimate_count, content_bytes, forgotten_count FROM "
               "contact_history_total"));
-  FATHOM_RETURN_IF_ERROR(table.ReloadTotal());
   return table;
 }
 
@@ -230,6 +222,7 @@ absl::Status HistoryTable::Insert(std::int64_t contact_number,
   insert_place_.BindReal(6, IndexSeconds(mark.last));
   total_.estimates += rows.size();
   total_.bytes += content.size();
+  ++inserted_;
   return insert_place_.Run();
 }
 
@@ -242,19 +235,32 @@ absl::Status HistoryTable::Delete(const Block& block) {
   return delete_place_.Run();
 }
 
-absl::Status HistoryTable::Forget(const HistoryLimits& limits, Time now) {
+absl::StatusOr<Time> HistoryTable::Newest() {
+  const absl::StatusOr<bool> row = newest_.Step();
+  const Time newest = row.ok() && *row && !newest_.ColumnIsNull(0)
+                          ? TimeFromUnixMicros(newest_.ColumnInt(0))
+                          : Time::min();
+  newest_.Reset();
+  FATHOM_RETURN_IF_ERROR(row.status());
+  return newest;
+}
+
+absl::Status HistoryTable::Forget(const HistoryLimits& limits) {
+  const std::uint64_t most =
+      std::max(kMaxForgottenBlocks, 2 * std::exchange(inserted_, 0));
   const bool too_much =
       limits.max_bytes.has_value() && total_.bytes > *limits.max_bytes;
   if (!too_much && !limits.max_age.has_value()) return absl::OkStatus();
-  const Time keep_from = now - limits.max_age.value_or(Duration(0));
+  FATHOM_ASSIGN_OR_RETURN(const Time newest, Newest());
   std::uint64_t bytes = total_.bytes;
   std::vector<Block> oldest;
-  oldest_.BindInt(0, kMaxForgottenBlocks);
+  oldest_.BindUint(0, most);
   while (true) {
     FATHOM_ASSIGN_OR_RETURN(const bool more, oldest_.Step());
     if (!more) break;
-    const bool too_old = limits.max_age.has_value() &&
-                         TimeFromUnixMicros(oldest_.ColumnInt(3)) < keep_from;
+    const bool too_old =
+        limits.max_age.has_value() &&
+        newest - TimeFromUnixMicros(oldest_.ColumnInt(3)) > *limits.max_age;
     if (!too_old && (!too_much || bytes <= *limits.max_bytes)) break;
     oldest.push_back({.id = oldest_.ColumnInt(0),
                       .estimates = oldest_.ColumnUint(1),
@@ -307,8 +313,15 @@ absl::StatusOr<std::optional<HistoryBlocks>> FindBlocks(
   find.BindText(1, key.contact.value);
   FATHOM_ASSIGN_OR_RETURN(const bool known, find.Step());
   if (!known) return std::nullopt;
+  return FindBlocksOf(connection, find.ColumnInt(0), key, from, to);
+}
+
+absl::StatusOr<HistoryBlocks> FindBlocksOf(Connection& connection,
+                                           std::int64_t contact_number,
+                                           const map::ContactKey& key,
+                                           Time from, Time to) {
   HistoryBlocks blocks{
-      .contact_number = find.ColumnInt(0), .key = key, .block_ids = {}};
+      .contact_number = contact_number, .key = key, .block_ids = {}};
   FATHOM_ASSIGN_OR_RETURN(
       Statement select,
       connection.Prepare(

@@ -47,13 +47,15 @@ struct HistoryBlockMark {
 // REQUIRES: rows, in order.
 HistoryBlockMark MarkOf(std::span<const ContactHistoryRow> rows);
 
-// Blocks forgotten in one transaction, at most: a checkpoint stays short. The
-// next one goes on.
-inline constexpr int kMaxForgottenBlocks = 1000;
+// Blocks forgotten in one transaction, at most, or twice as many as were
+// written since the last one: a checkpoint stays short, and the limits are
+// reached. The next one goes on.
+inline constexpr std::uint64_t kMaxForgottenBlocks = 1000;
 
 class HistoryTable {
  public:
-  // `connection` must outlive it.
+  // `connection` must outlive it. Before anything is written or total() asked
+  // for, ReloadTotal.
   static absl::StatusOr<HistoryTable> Create(Connection& connection);
 
   // Puts the tail into blocks: what it cut goes, and a last block that is less
@@ -61,9 +63,9 @@ class HistoryTable {
   absl::Status Write(std::int64_t contact_number, const HistoryTail& tail);
 
   // Deletes blocks, the one that ended first first, that the limits do not
-  // allow: all older than max_age beside `now`, then as long as there are more
-  // than max_bytes. At most kMaxForgottenBlocks.
-  absl::Status Forget(const HistoryLimits& limits, Time now);
+  // allow: all older than max_age beside the newest row, then as long as there
+  // are more than max_bytes. At most kMaxForgottenBlocks.
+  absl::Status Forget(const HistoryLimits& limits);
 
   // The newest revision in the contact's blocks; 0: there are none.
   absl::StatusOr<std::uint64_t> NewestRevision(std::int64_t contact_number);
@@ -73,7 +75,8 @@ class HistoryTable {
                                 std::span<const ContactHistoryRow> rows);
 
   const HistoryTotal& total() const { return total_; }
-  // As it stands in the file: after a transaction that was rolled back.
+  // As it stands in the file: at first, and after a transaction that was
+  // rolled back.
   absl::Status ReloadTotal();
 
  private:
@@ -88,8 +91,12 @@ class HistoryTable {
                       std::span<const ContactHistoryRow> rows);
   absl::Status Delete(const Block& block);
   absl::Status WriteTotal();
+  // The time of the newest row; the earliest there is: there are none.
+  absl::StatusOr<Time> Newest();
 
   HistoryTotal total_;
+  // Blocks written since the last Forget.
+  std::uint64_t inserted_ = 0;
   Statement newest_blocks_;
   Statement newest_revision_;
   Statement read_;
@@ -98,6 +105,7 @@ class HistoryTable {
   Statement delete_;
   Statement delete_place_;
   Statement oldest_;
+  Statement newest_;
   Statement place_;
   Statement write_total_;
   Statement read_total_;
@@ -114,6 +122,12 @@ struct HistoryBlocks {
 // `to`; nullopt: the file does not know it. Errors: those of sqlite.h.
 absl::StatusOr<std::optional<HistoryBlocks>> FindBlocks(
     Connection& connection, const map::ContactKey& key, Time from, Time to);
+
+// The same of a contact whose number is known.
+absl::StatusOr<HistoryBlocks> FindBlocksOf(Connection& connection,
+                                           std::int64_t contact_number,
+                                           const map::ContactKey& key,
+                                           Time from, Time to);
 
 // The same of all contacts, in order of key, of blocks that may hold something
 // within the area. O(log blocks + blocks found).

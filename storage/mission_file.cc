@@ -110,7 +110,8 @@ class MissionFile::Impl {
       const map::ContactKey& key, Time from, Time to,
       const std::function<bool(const ContactHistoryRow&)>& visit);
   absl::StatusOr<std::vector<ContactHistoryRow>> ReadContactHistoryIn(
-      const HistoryArea& area, Time from, Time to, std::size_t max_rows);
+      const HistoryArea& area, Time from, Time to, std::size_t max_rows,
+      const std::atomic<bool>* stop);
   absl::StatusOr<SavedCopy> SaveCopy(const std::string& path);
   absl::StatusOr<Proof> Verify();
   MissionFileStatus Status() const;
@@ -162,6 +163,8 @@ class MissionFile::Impl {
 
   mutable Mutex reader_mutex_;
   Connection reader_ FATHOM_GUARDED_BY(reader_mutex_);
+  // Close lets go of history_.
+  bool reads_closed_ FATHOM_GUARDED_BY(reader_mutex_) = false;
 
   mutable Mutex status_mutex_;
   MissionFileStatus status_ FATHOM_GUARDED_BY(status_mutex_);
@@ -401,6 +404,7 @@ absl::Status MissionFile::Impl::Close() {
   {
     MutexLock lock(reader_mutex_);
     reader_ = Connection();
+    reads_closed_ = true;
   }
   absl::Status status = failed_;
   if (history_ != nullptr && status.ok()) status = FlushHistory();
@@ -427,6 +431,9 @@ absl::StatusOr<Connection> MissionFile::Impl::OpenReader(
 absl::Status MissionFile::Impl::ReadAtOneMoment(
     const std::function<absl::Status(Connection&)>& read) {
   MutexLock lock(reader_mutex_);
+  if (reads_closed_) {
+    return absl::FailedPreconditionError("the mission is closed");
+  }
   if (!reader_.is_open()) {
     FATHOM_ASSIGN_OR_RETURN(reader_, OpenReader(path_));
   }
@@ -440,24 +447,26 @@ absl::Status MissionFile::Impl::ReadAtOneMoment(
 absl::Status MissionFile::Impl::ReadContactHistory(
     const map::ContactKey& key, Time from, Time to,
     const std::function<bool(const ContactHistoryRow&)>& visit) {
-  // Before the file: what goes into it meanwhile is then seen twice, not
-  // missed.
-  const HistoryTail tail = history_->Tail(key);
   return ReadAtOneMoment([&](Connection& reader) {
+    // Before the file: what goes into it meanwhile is then seen twice, not
+    // missed.
+    const HistoryTail tail = history_->Tail(key);
     return ReadHistory(reader, key, tail, from, to, visit);
   });
 }
 
 absl::StatusOr<std::vector<ContactHistoryRow>>
 MissionFile::Impl::ReadContactHistoryIn(const HistoryArea& area, Time from,
-                                        Time to, std::size_t max_rows) {
-  HistoryTails tails;
-  for (const map::ContactKey& key : history_->Contacts()) {
-    tails.emplace(key, history_->Tail(key));
-  }
+                                        Time to, std::size_t max_rows,
+                                        const std::atomic<bool>* stop) {
   absl::StatusOr<std::vector<ContactHistoryRow>> rows;
   FATHOM_RETURN_IF_ERROR(ReadAtOneMoment([&](Connection& reader) {
-    rows = ReadHistoryIn(reader, area, tails, from, to, max_rows);
+    // Before the file, as above.
+    HistoryTails tails;
+    for (const map::ContactKey& key : history_->Contacts()) {
+      tails.emplace(key, history_->Tail(key));
+    }
+    rows = ReadHistoryIn(reader, area, tails, from, to, max_rows, stop);
     return rows.status();
   }));
   return rows;
@@ -565,8 +574,9 @@ absl::Status MissionFile::ReadContactHistory(
 
 absl::StatusOr<std::vector<ContactHistoryRow>>
 MissionFile::ReadContactHistoryIn(const HistoryArea& area, Time from, Time to,
-                                  std::size_t max_rows) {
-  return impl_->ReadContactHistoryIn(area, from, to, max_rows);
+                                  std::size_t max_rows,
+                                  const std::atomic<bool>* stop) {
+  return impl_->ReadContactHistoryIn(area, from, to, max_rows, stop);
 }
 absl::StatusOr<SavedCopy> MissionFile::SaveCopy(const std::string& path) {
   return impl_->SaveCopy(path);

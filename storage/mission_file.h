@@ -24,6 +24,7 @@
 #ifndef FATHOM_STORAGE_MISSION_FILE_H_
 #define FATHOM_STORAGE_MISSION_FILE_H_
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -72,8 +73,9 @@ struct MissionFileStatus {
   std::uint64_t checkpoint_revision = 0;
   // The log is beyond kWalKeepBytes: a reader keeps it from being copied.
   bool log_starved = false;
-  // Of the contact history: what is in blocks (the newest estimates, at most
-  // one block of each contact, come on top), and what the limits let go.
+  // Of the contact history: what is in blocks (the newest estimates, a block of
+  // each contact and what comes until its turn, come on top), and what the
+  // limits let go.
   HistoryTotal history;
   HistoryLimits history_limits;
 };
@@ -146,16 +148,19 @@ class MissionFile {
   // Calls `visit` for the contact's estimates with from <= time <= to, oldest
   // first, until it returns false. It must not call this object. Waits for
   // other callers of this function, never for Commit.
-  // Errors: NOT_FOUND (the contact was never reported); those of sqlite.h.
+  // Errors: NOT_FOUND (the contact was never reported); FAILED_PRECONDITION
+  // (closed); those of sqlite.h.
   absl::Status ReadContactHistory(
       const map::ContactKey& key, Time from, Time to,
       const std::function<bool(const ContactHistoryRow&)>& visit);
 
   // The estimates of all contacts with from <= time <= to whose position lies
   // within `area`: by contact, oldest first. As above. Errors:
-  // RESOURCE_EXHAUSTED past `max_rows`; those of sqlite.h.
+  // RESOURCE_EXHAUSTED past `max_rows`; CANCELLED soon after `stop`, if there
+  // is one, is true; FAILED_PRECONDITION (closed); those of sqlite.h.
   absl::StatusOr<std::vector<ContactHistoryRow>> ReadContactHistoryIn(
-      const HistoryArea& area, Time from, Time to, std::size_t max_rows);
+      const HistoryArea& area, Time from, Time to, std::size_t max_rows,
+      const std::atomic<bool>* stop = nullptr);
 
   // Writes a consistent copy, as of the last commit, to `path` (which must
   // not exist) while work goes on: copied, fsynced, proved (verify.h), and

@@ -136,7 +136,7 @@ struct HistoryArea {
 // How much of the contact history is kept; what is older goes first. Judged at
 // each checkpoint, so that what a journal could make again is never in doubt.
 struct HistoryLimits {
-  // Beside the map's newest evidence.
+  // Beside the newest estimate in blocks.
   std::optional<Duration> max_age;
   // Of what is kept in blocks: about 100 bytes an estimate.
   std::optional<std::uint64_t> max_bytes;

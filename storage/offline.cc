@@ -16,6 +16,7 @@
 #include "storage/file_lock.h"
 #include "storage/history_reader.h"
 #include "storage/history_replay.h"
+#include "storage/history_table.h"
 #include "storage/loader.h"
 #include "storage/mission_file.h"
 #include "storage/restore.h"
@@ -87,7 +88,20 @@ absl::Status CountHistory(Connection& connection, MissionInfo& info) {
   for (const auto& [key, tail] : tails) {
     info.history_rows += tail.rows.size();
     FATHOM_ASSIGN_OR_RETURN(const auto number, contacts.FindNumber(key));
-    if (!number.has_value()) ++info.contacts;
+    if (!number.has_value()) {
+      ++info.contacts;
+    } else if (tail.cut.has_value()) {
+      FATHOM_ASSIGN_OR_RETURN(
+          const HistoryBlocks cut,
+          FindBlocksOf(connection, *number, key, *tail.cut, Time::max()));
+      FATHOM_RETURN_IF_ERROR(ReadBlocks(connection, cut, {}, *tail.cut,
+                                        Time::max(),
+                                        [&info](const ContactHistoryRow&) {
+                                          --info.history_rows;
+                                          return true;
+                                        })
+                                 .status());
+    }
   }
   return absl::OkStatus();
 }

@@ -107,6 +107,7 @@ class Prover {
             "(SELECT contact_number FROM contact) FROM contact_history"));
     FATHOM_ASSIGN_OR_RETURN(HistoryTable table,
                             HistoryTable::Create(connection_));
+    FATHOM_RETURN_IF_ERROR(table.ReloadTotal());
     HistoryTotal total = {.forgotten_estimates =
                               table.total().forgotten_estimates};
     while (true) {

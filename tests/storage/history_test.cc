@@ -4,7 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <map>
 #include <memory>
@@ -19,6 +21,7 @@
 #include "storage/mission_file.h"
 #include "storage/offline.h"
 #include "storage/restore.h"
+#include "storage/sqlite.h"
 #include "tests/storage/sample_records.h"
 #include "tests/storage/temp_dir.h"
 #include "tests/testing/status_matchers.h"
@@ -230,6 +233,9 @@ TEST_F(HistoryFileTest, IsWhatAPlainListSaysWhateverHappens) {
         std::size_t rows = 0;
         for (const auto& [key, kept] : kept_) rows += kept.size();
         EXPECT_EQ(proof.history_rows, rows);
+        FATHOM_ASSERT_OK_AND_ASSIGN(const MissionInfo info, ReadInfo(cut));
+        EXPECT_EQ(info.history_rows, rows);
+        EXPECT_EQ(info.contacts, kept_.size());
       }
       FATHOM_ASSERT_OK_AND_ASSIGN(const auto again, MissionFile::Open(cut));
       ASSERT_THAT(again->Load(), IsOk());
@@ -319,6 +325,9 @@ TEST_F(HistoryFileTest, AreaAndTimeFindWhatAPlainSearchFinds) {
     }
     if (expected.empty()) continue;
     ++found_some;
+    const std::atomic<bool> stop = true;
+    EXPECT_THAT(file_->ReadContactHistoryIn(area, from, to, 10'000, &stop),
+                StatusIs(absl::StatusCode::kCancelled));
     EXPECT_THAT(
         file_->ReadContactHistoryIn(area, from, to, expected.size() - 1),
         StatusIs(absl::StatusCode::kResourceExhausted));
@@ -363,6 +372,85 @@ TEST_F(HistoryFileTest, WhatIsOlderThanAllowedGoesWithACheckpoint) {
   EXPECT_EQ(revisions.front(), 641u);
   FATHOM_ASSERT_OK_AND_ASSIGN(const Proof proof, file_->Verify());
   EXPECT_THAT(proof.problems, IsEmpty());
+}
+
+// A ping's clock says nothing of the contacts: one of 2090 would let all go.
+TEST_F(HistoryFileTest, AgeIsBesideTheNewestEstimateWhateverTheMapSays) {
+  ASSERT_THAT(map_->RestoreRevision(0, At(0) + std::chrono::years(80)), IsOk());
+  saved_ = map_->View();
+  file_->LimitHistory({.max_age = std::chrono::seconds(300), .max_bytes = {}});
+  for (int i = 0; i < 100; ++i) Report(SampleReport(i, "a"));
+  Commit(true);
+  Report(SampleReport(100, "a"));
+  Commit(true);
+  EXPECT_EQ(saved_->as_of(), At(0) + std::chrono::years(80));
+  const HistoryTotal total = file_->Status().history;
+  EXPECT_EQ(total.forgotten_estimates, 0u);
+  EXPECT_EQ(total.estimates, 101u);
+}
+
+// A checkpoint writes a block of each contact that has a tail.
+TEST_F(HistoryFileTest, AsMuchGoesAsACheckpointWrites) {
+  file_->LimitHistory({.max_age = {}, .max_bytes = 0});
+  for (int i = 0; i < 1500; ++i) {
+    batch_.contact_history.push_back(Row(i, 1));
+    batch_.contact_history.back().estimate.key = {
+        .source = {"c4i"}, .contact = {std::to_string(i)}};
+  }
+  Commit(true);
+  const HistoryTotal total = file_->Status().history;
+  EXPECT_EQ(total.estimates, 0u);
+  EXPECT_EQ(total.forgotten_estimates, 1500u);
+}
+
+TEST_F(HistoryFileTest, NothingIsReadAfterClose) {
+  Report(SampleReport(1, "a"));
+  Commit(false);
+  ASSERT_THAT(file_->Close(), IsOk());
+  EXPECT_THAT(file_->ReadContactHistory(
+                  {.source = {"c4i"}, .contact = {"a"}}, Time::min(),
+                  Time::max(), [](const ContactHistoryRow&) { return true; }),
+              StatusIs(absl::StatusCode::kFailedPrecondition));
+  EXPECT_THAT(file_->ReadContactHistoryIn({}, Time::min(), Time::max(), 10),
+              StatusIs(absl::StatusCode::kFailedPrecondition));
+}
+
+// Of one damaged page of what is beside the blocks: they are kept all the same.
+TEST_F(HistoryFileTest, RepairNeedsTheBlocksAlone) {
+  for (int i = 0; i < 1000; ++i) {
+    Report(SampleReport(i, "c" + std::to_string(i % 3)));
+    if (i % 100 == 99) Commit(i == 899);
+  }
+  ASSERT_THAT(file_->Close(), IsOk());
+  file_.reset();
+  for (const std::string page_of :
+       {"contact_history_total", "sqlite_autoindex_contact_1"}) {
+    std::int64_t page = 0;
+    {
+      FATHOM_ASSERT_OK_AND_ASSIGN(
+          Connection connection,
+          Connection::Open(path(), Connection::Mode::kReadOnly));
+      FATHOM_ASSERT_OK_AND_ASSIGN(
+          page, connection.QueryInt(
+                    "SELECT rootpage FROM sqlite_schema WHERE name = '" +
+                    page_of + "'"));
+    }
+    const std::string damaged = dir_.File(page_of);
+    std::filesystem::copy_file(path(), damaged);
+    {
+      std::fstream bytes(damaged,
+                         std::ios::in | std::ios::out | std::ios::binary);
+      bytes.seekp((page - 1) * 8192 + 4000);
+      bytes.put('x');
+    }
+    FATHOM_ASSERT_OK_AND_ASSIGN(const Repair repair,
+                                RepairMission(damaged, damaged + ".repaired"));
+    EXPECT_EQ(repair.history_rows, 1000u) << page_of;
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto mended,
+                                MissionFile::Open(damaged + ".repaired"));
+    ExpectKept(*mended);
+    EXPECT_EQ(mended->Status().history.estimates, 1000u) << page_of;
+  }
 }
 
 TEST_F(HistoryFileTest, WhatIsMoreThanAllowedGoesOldestFirst) {
