@@ -231,6 +231,11 @@ absl::StatusOr<map::DropContact> ConvertDrop(
   if (request.has_time()) {
     FATHOM_ASSIGN_OR_RETURN(event.time,
                             CheckTime(request.time(), FieldPath(root, "time")));
+    if (event.time - now > kMostAhead) {
+      return InvalidField(
+          "time", absl::StrFormat("is over %d h ahead of the server's clock",
+                                  kMostAhead.count()));
+    }
   }
   return event;
 }

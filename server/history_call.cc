@@ -70,8 +70,11 @@ class HistoryMessages {
   size_t count_ = 0;
 };
 
+// CANCELLED soon after `stop` is true.
 absl::StatusOr<std::deque<v1::GetContactHistoryResponse>> ReadHistory(
-    storage::MissionFile& file, const v1::GetContactHistoryRequest& request) {
+    storage::MissionFile& file, const v1::GetContactHistoryRequest& request,
+    const std::atomic<bool>& stop) {
+  if (stop) return absl::CancelledError("client has gone");
   const FieldPath root;
   FATHOM_ASSIGN_OR_RETURN(const std::optional<storage::HistoryArea> area,
                           ConvertArea(request));
@@ -100,7 +103,7 @@ absl::StatusOr<std::deque<v1::GetContactHistoryResponse>> ReadHistory(
   HistoryMessages messages;
   if (of_all) {
     const auto rows =
-        file.ReadContactHistoryIn(*area, from, to, kMaxHistoryEstimates);
+        file.ReadContactHistoryIn(*area, from, to, kMaxHistoryEstimates, &stop);
     if (absl::IsResourceExhausted(rows.status())) {
       return HistoryMessages::TooMany();
     }
@@ -112,6 +115,7 @@ absl::StatusOr<std::deque<v1::GetContactHistoryResponse>> ReadHistory(
                                .contact = {request.contact_id()}};
   const absl::Status read = file.ReadContactHistory(
       key, from, to, [&](const storage::ContactHistoryRow& row) {
+        if (stop) return false;
         if (area.has_value() && !area->Holds(row.estimate.Position())) {
           return true;
         }
@@ -121,6 +125,7 @@ absl::StatusOr<std::deque<v1::GetContactHistoryResponse>> ReadHistory(
     return NoSuchContact(request.source_id(), request.contact_id());
   }
   FATHOM_RETURN_IF_ERROR(read);
+  if (stop) return absl::CancelledError("client has gone");
   return messages.Take();
 }
 
@@ -130,7 +135,7 @@ HistoryStream::HistoryStream(ServerContext& context,
                              const v1::GetContactHistoryRequest& request)
     : context_(context) {
   context_.workers.Give([this, request] {
-    auto messages = ReadHistory(context_.file, request);
+    auto messages = ReadHistory(context_.file, request, gone_);
     if (!messages.ok()) {
       Finish(ToGrpc(messages.status()));
       return;

@@ -4,6 +4,7 @@
 #ifndef FATHOM_SERVER_HISTORY_CALL_H_
 #define FATHOM_SERVER_HISTORY_CALL_H_
 
+#include <atomic>
 #include <deque>
 
 #include "fathom/v1/obstacle_service.grpc.pb.h"
@@ -21,12 +22,15 @@ class HistoryStream final
   HistoryStream(ServerContext& context,
                 const v1::GetContactHistoryRequest& request);
   void OnWriteDone(bool ok) override;
+  // May come while the file is read: that then ends.
+  void OnCancel() override { gone_ = true; }
   void OnDone() override;
 
  private:
   void WriteNext();
 
   ServerContext& context_;
+  std::atomic<bool> gone_{false};
   std::deque<v1::GetContactHistoryResponse> messages_;
 };
 

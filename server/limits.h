@@ -45,9 +45,10 @@ inline constexpr size_t kMaxPointsPerQuery = 100'000;
 // Most waypoints in CheckTrajectory: a day's plan at one a ten seconds.
 inline constexpr size_t kMaxWaypoints = 10'000;
 
-// A contact report is refused if it is stamped further ahead of the server's
-// clock. Simulations and clocks that run ahead are the sender's matter;
-// milliseconds taken for seconds would close the contact to all true reports.
+// A contact's report or drop is refused if it is stamped further ahead of the
+// server's clock. Simulations and clocks that run ahead are the sender's
+// matter; milliseconds taken for seconds would close the contact to all true
+// reports.
 inline constexpr std::chrono::hours kMostAhead{24};
 
 // Share of max_contacts from which GetMissionStatus warns.

@@ -134,6 +134,9 @@ TEST(ConvertDrop, NamesEveryBadField) {
   EXPECT_EQ(event.time, kNow);
   request.mutable_time()->set_seconds(-1);
   EXPECT_THAT(ConvertDrop(request, kNow), Violates("time"));
+  // 2090: it would age the whole contact history.
+  request.mutable_time()->set_seconds(3'800'000'000);
+  EXPECT_THAT(ConvertDrop(request, kNow), Violates("time"));
 }
 
 absl::StatusOr<ChartHeader> Header(const v1::PriorHeader& header) {
