@@ -21,7 +21,9 @@
 #include <memory>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "map/geodesy/depth_estimate.h"
+#include "map/local/estimator.h"
 #include "map/local/evidence.h"
 #include "map/local/evidence_cells.h"
 #include "map/local/hazard.h"
@@ -108,6 +110,12 @@ struct LocalBlock {
   }
   bool measured(std::size_t k) const { return evidence.measured(k); }
 };
+
+// Whether soundings can have left such a block in a map of this estimator: its
+// arrays fit, each number is in the range that the map takes. A reader reckons
+// without looking again.
+// Errors: INVALID_ARGUMENT with the first cell that is not so.
+absl::Status ValidateBlock(const LocalBlock& block, EstimatorKind estimator);
 
 }  // namespace fathom::map
 

@@ -462,21 +462,10 @@ absl::Status LocalMap::RestoreBlock(BlockIndex index, LocalBlock block) {
         absl::StrFormat("block row=%u col=%u must be below %u, %u", index.row,
                         index.col, grid.blocks_north, grid.blocks_east));
   }
-  const std::size_t nervegna_cells =
-      grid.options.estimator == EstimatorKind::kNervegna ? kBlockCells : 0;
-  if (block.nervegna.size() != nervegna_cells) {
+  if (const absl::Status valid = ValidateBlock(block, grid.options.estimator);
+      !valid.ok()) {
     return absl::InvalidArgumentError(absl::StrFormat(
-        "block row=%u col=%u: nervegna cells=%u must be %u", index.row,
-        index.col, block.nervegna.size(), nervegna_cells));
-  }
-  for (std::size_t n = 0; n < block.pending.size(); ++n) {
-    const std::uint16_t cell = block.pending[n].cell;
-    if (cell >= kBlockCells || (n > 0 && cell <= block.pending[n - 1].cell)) {
-      return absl::InvalidArgumentError(absl::StrFormat(
-          "block row=%u col=%u: pending[%u].cell=%u must be below 256 and in "
-          "order",
-          index.row, index.col, n, cell));
-    }
+        "block row=%u col=%u: %s", index.row, index.col, valid.message()));
   }
   BlockDirectory& mine = state_->MutableDirectory();
   bool created = false;

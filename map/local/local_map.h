@@ -74,8 +74,8 @@ class LocalMap {
   void MarkTransferred();
 
   // Puts back a block as a view once gave it.
-  // Errors: INVALID_ARGUMENT when the index lies outside the map or the
-  // block's arrays do not fit the estimator.
+  // Errors: INVALID_ARGUMENT when the index lies outside the map, and those of
+  // ValidateBlock.
   absl::Status RestoreBlock(BlockIndex index, LocalBlock block);
 
   // The map as it is now, immutable. O(1).

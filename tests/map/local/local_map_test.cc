@@ -409,5 +409,69 @@ TEST(LocalMap, RestoreRefusesWhatDoesNotFit) {
   EXPECT_FALSE(map.RestoreBlock({}, LocalBlock{}).ok());
 }
 
+// A block whose seal was right and whose weight was no weight made a reading
+// NaN, and the fuzzer found it (tests/fuzz/corpus/tiles/weightless).
+TEST(LocalMap, RestoreRefusesWhatNoSoundingLeaves) {
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  LocalMap map = MakeMap(TestOptions(EstimatorKind::kAdaptive));
+  const PackedEvidence sound = {
+      .weight = 4.0f, .mean_m = 20.0f, .scatter = 1.0f, .time_count = 2u << 16};
+  const auto restore =
+      [&](const PackedEvidence& fresh, const CellPrior& prior = {},
+          const PendingShoal& pending = {.depth_m = 3.0f, .std_m = 0.1f}) {
+        LocalBlock block;
+        block.evidence.Restore(7, fresh, nullptr);
+        block.uniform_prior = prior;
+        block.pending = {pending};
+        return map.RestoreBlock({}, block);
+      };
+  EXPECT_THAT(restore(sound), IsOk());
+  for (const float bad : {kNan, -1.0f, 0.0f, 1e-9f, 1e20f}) {
+    PackedEvidence cell = sound;
+    cell.weight = bad;
+    EXPECT_FALSE(restore(cell).ok()) << "weight " << bad;
+  }
+  for (const float bad : {kNan, -102.0f, 12002.0f}) {
+    PackedEvidence cell = sound;
+    cell.mean_m = bad;
+    EXPECT_FALSE(restore(cell).ok()) << "mean " << bad;
+    EXPECT_FALSE(
+        restore(sound,
+                {.depth_m = bad, .std_m = 1.0f, .kind = EvidenceKind::kPrior})
+            .ok())
+        << "prior " << bad;
+    EXPECT_FALSE(restore(sound, {}, {.depth_m = bad, .std_m = 0.1f}).ok())
+        << "pending " << bad;
+  }
+  // Four soundings of 1 m scatter by less than 4 (12 100 m)^2 m^-2.
+  for (const float bad : {kNan, 1e9f, -1e9f}) {
+    PackedEvidence cell = sound;
+    cell.scatter = bad;
+    EXPECT_FALSE(restore(cell).ok()) << "scatter " << bad;
+  }
+  PackedEvidence uncounted = sound;
+  uncounted.time_count = 0;
+  EXPECT_FALSE(restore(uncounted).ok());
+  for (const float bad : {kNan, 0.0f, -1.0f, 1e9f}) {
+    EXPECT_FALSE(
+        restore(sound,
+                {.depth_m = 20.0f, .std_m = bad, .kind = EvidenceKind::kPrior})
+            .ok())
+        << "prior std " << bad;
+    EXPECT_FALSE(restore(sound, {}, {.depth_m = 3.0f, .std_m = bad}).ok())
+        << "pending std " << bad;
+  }
+  // Land has no depth.
+  EXPECT_THAT(restore(sound, {.depth_m = kNan, .kind = EvidenceKind::kLand}),
+              IsOk());
+  LocalMap nervegna = MakeMap(TestOptions(EstimatorKind::kNervegna));
+  for (const float bad : {kNan, -1.0f}) {
+    LocalBlock block;
+    block.nervegna.resize(kBlockCells);
+    block.nervegna[255].variance_m2 = bad;
+    EXPECT_FALSE(nervegna.RestoreBlock({}, block).ok()) << "variance " << bad;
+  }
+}
+
 }  // namespace
 }  // namespace fathom::map
