@@ -12,6 +12,14 @@ int CheckContactLimits(const nlohmann::json& report) {
     return report.value(figure, nlohmann::json::array());
   };
 
+  for (const auto& row : rows("contact_reference")) {
+    Limit reference(
+        "reference " + row["scene"].get<std::string>() + ": worst error",
+        row["limit"].get<double>());
+    reference.Offer(row["worst_error"], row["source"].get<std::string>());
+    missed += reference.Report();
+  }
+
   // chi^2 at 2.5 and 97.5 % of 100 runs; the lower bounds with their sign
   // turned. A fifth below per_axis is asked for where it can be had: where a
   // filter that is told the true direction for its weights is a quarter and

@@ -28,6 +28,11 @@ nlohmann::json ThesisContactFigures();
 // Returns how many were written.
 int DrawThesisContact(const std::string& folder);
 
+// Converted measurements, one Kalman step, steady states, probabilities over a
+// disc and closest approaches against the tables of `folder`: of each table the
+// worst error, relative but where the row says otherwise, and its limit.
+nlohmann::json ContactReferenceFigures(const std::string& folder);
+
 // Recorded tracks in `folder`: radar with GPS truth (autoferry), AIS (Solent).
 nlohmann::json RecordedContactFigures(const std::string& folder);
 

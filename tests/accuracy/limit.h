@@ -25,7 +25,7 @@ class Limit {
   int Report() const {
     if (!offered_) return 0;
     const bool missed = !(worst_ <= most_);
-    std::printf("%-6s %-58s %8.3f <= %-6g (%s)\n", missed ? "MISSED" : "ok",
+    std::printf("%-6s %-58s %8.3g <= %-6g (%s)\n", missed ? "MISSED" : "ok",
                 what_.c_str(), worst_, most_, where_.c_str());
     return missed ? 1 : 0;
   }

@@ -133,6 +133,8 @@ int Run(int argc, char** argv) {
              return RecordedFigures(
                  data + "/soundings/r2sonic2026_sf_every8th_ping.csv.gz");
            }},
+          {"contact_reference",
+           [&] { return ContactReferenceFigures(data + "/reference"); }},
           {"contact_consistency", ContactConsistencyFigures},
           {"contact_prediction", ContactPredictionFigures},
           {"contact_thesis", ThesisContactFigures},

@@ -10,16 +10,13 @@
 #include <string>
 #include <vector>
 
-#include "tests/testing/shared_numbers.h"
+#include "tests/testing/contact_reference.h"
 #include "tests/testing/status_matchers.h"
 
 namespace fathom::map {
 namespace {
 
-using ::fathom::testing::LinesOf;
-using ::fathom::testing::NumbersIn;
-
-const std::string kReference = FATHOM_SHARED_DATA_DIR "/reference/";
+const std::string kReference = FATHOM_SHARED_DATA_DIR "/reference";
 
 constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 
@@ -71,14 +68,6 @@ TEST(Predict, MatchesTheSumByHand) {
   EXPECT_EQ(next.P(0, 3), 0);
 }
 
-TEST(Predict, NoiseMatchesTheReference) {
-  // stonesoup_reference.txt, "CV": T = 5, q = 0.1.
-  const TrackState next = Predict(TrackState{}, 5.0, 0.1);
-  EXPECT_NEAR(next.P(0, 0), 4.166666666666667, 1e-12);
-  EXPECT_NEAR(next.P(0, 2), 1.25, 1e-12);
-  EXPECT_NEAR(next.P(2, 2), 0.5, 1e-12);
-}
-
 TEST(Predict, TwoSpansAreTheirSum) {
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> unit(-1, 1);
@@ -109,57 +98,13 @@ TEST(Predict, BackwardsIsNoSurerThanForwards) {
   EXPECT_TRUE(IsSymmetricPositiveDefinite(back.P));
 }
 
-TEST(ConvertUnbiased, MatchesEveryReferenceRow) {
-  const auto lines = LinesOf(kReference + "nrl_reference_octave.txt");
-  if (lines.empty()) GTEST_SKIP() << "no shared reference numbers";
-  int rows = 0;
-  for (const std::string& line : lines) {
-    if (line.starts_with("=== NEES")) break;
-    const std::vector<double> n = NumbersIn(line);
-    // r theta_deg sr st_deg alg x y R11 R12 R22; 3: modified unbiased.
-    if (line.starts_with("===") || n.size() != 10 || n[4] != 3) continue;
-    ++rows;
-    const PositionMeasurement got =
-        ConvertUnbiased({.range_m = n[0],
-                         .azimuth_rad = n[1] * kRadPerDeg,
-                         .range_std_m = n[2],
-                         .azimuth_std_rad = n[3] * kRadPerDeg});
-    // The table has 15 digits; its covariances were formed as differences of
-    // r^2, which leaves 1e-15 r^2 of rounding.
-    const double slack = 1e-9 * n[0];
-    EXPECT_NEAR(got.z(0), n[5], slack) << line;
-    EXPECT_NEAR(got.z(1), n[6], slack) << line;
-    const double scale = 1e-9 * (n[7] + n[9]);
-    EXPECT_NEAR(got.R(0, 0), n[7], scale) << line;
-    EXPECT_NEAR(got.R(0, 1), n[8], scale) << line;
-    EXPECT_NEAR(got.R(1, 1), n[9], scale) << line;
-    EXPECT_EQ(got.R(0, 1), got.R(1, 0));
+TEST(Convert, MatchesEveryReferenceRow) {
+  for (const FilterKind kind : {FilterKind::kFourState, FilterKind::kPerAxis}) {
+    const auto errors = testing::ConversionErrors(kReference, kind);
+    if (errors.empty()) GTEST_SKIP() << "no shared reference numbers";
+    EXPECT_EQ(errors.size(), 7u);
+    for (const auto& [row, error] : errors) EXPECT_LE(error, 1e-9) << row;
   }
-  EXPECT_EQ(rows, 7);
-}
-
-TEST(ConvertPlain, MatchesEveryReferenceRow) {
-  const auto lines = LinesOf(kReference + "nrl_reference_octave.txt");
-  if (lines.empty()) GTEST_SKIP() << "no shared reference numbers";
-  int rows = 0;
-  for (const std::string& line : lines) {
-    if (line.starts_with("=== NEES")) break;
-    const std::vector<double> n = NumbersIn(line);
-    if (line.starts_with("===") || n.size() != 10 || n[4] != 0) continue;
-    ++rows;
-    const PositionMeasurement got =
-        ConvertPlain({.range_m = n[0],
-                      .azimuth_rad = n[1] * kRadPerDeg,
-                      .range_std_m = n[2],
-                      .azimuth_std_rad = n[3] * kRadPerDeg});
-    EXPECT_NEAR(got.z(0), n[5], 1e-9 * n[0]) << line;
-    EXPECT_NEAR(got.z(1), n[6], 1e-9 * n[0]) << line;
-    const double scale = 1e-9 * (n[7] + n[9]);
-    EXPECT_NEAR(got.R(0, 0), n[7], scale) << line;
-    EXPECT_NEAR(got.R(0, 1), n[8], scale) << line;
-    EXPECT_NEAR(got.R(1, 1), n[9], scale) << line;
-  }
-  EXPECT_EQ(rows, 7);
 }
 
 TEST(ConvertUnbiased, MatchesTheFormulaByHand) {
@@ -230,68 +175,20 @@ TEST(Update, BothFiltersAgreeWhenTheAxesAreIndependent) {
 }
 
 TEST(Update, MatchesTheReferenceStep) {
-  const auto lines = LinesOf(kReference + "stonesoup_reference.txt");
-  if (lines.empty()) GTEST_SKIP() << "no shared reference numbers";
-  // State order there: [x vx y vy].
-  const int order[4] = {0, 2, 1, 3};
-  const auto read = [&](const std::string& start) {
-    TrackState state;
-    for (const std::string& line : lines) {
-      if (!line.starts_with(start)) continue;
-      const std::vector<double> n = NumbersIn(line);
-      for (int r = 0; r < 4; ++r) {
-        state.x(order[r]) = n.at(static_cast<std::size_t>(r));
-        for (int c = 0; c < 4; ++c) {
-          state.P(order[r], order[c]) =
-              n.at(4 + 4 * static_cast<std::size_t>(r) +
-                   static_cast<std::size_t>(c));
-        }
-      }
-    }
-    return state;
-  };
-  const TrackState prior = read("pred x");
-  const TrackState expected = read("KF x");
-  ASSERT_EQ(prior.x(0), 970);
-  // The file tells no measurement; it follows from it. R: 533.33 R /
-  // (533.33 + R) = 158.24, R = 225; z: 7.033 / 0.7033 = 10 from 970, 510.
-  const UpdatedState got =
-      Update(FilterKind::kFourState, prior, At(980, 510, 225));
-  EXPECT_LT((got.state.x - expected.x).norm(), 1e-6);
-  EXPECT_LT((got.state.P - expected.P).norm(), 1e-6);
-  // Line "NIS": 200 / 758.33.
-  EXPECT_NEAR(got.nis, 0.26373626373626374, 1e-9);
+  const auto errors = testing::KalmanStepErrors(kReference);
+  if (errors.empty()) GTEST_SKIP() << "no shared reference numbers";
+  for (const auto& [row, error] : errors) EXPECT_LE(error, 1e-6) << row;
+  EXPECT_LE(errors.front().error, 1e-12);  // Process noise.
+  EXPECT_LE(errors.back().error, 1e-9);    // NIS.
 }
 
 TEST(Update, ReachesTheSteadyStateOfTheReference) {
-  const auto lines = LinesOf(kReference + "steady_state_alpha_beta.csv");
-  if (lines.empty()) GTEST_SKIP() << "no shared reference numbers";
-  int rows = 0;
-  for (const std::string& line : lines) {
-    if (!line.starts_with("CWNA,")) continue;
-    ++rows;
-    // T q R K_pos K_vel P11 P12 P22.
-    const std::vector<double> n = NumbersIn(line);
-    for (const FilterKind kind :
-         {FilterKind::kPerAxis, FilterKind::kFourState}) {
-      TrackState state = FirstState(At(0, 0, n[2]), 10);
-      for (int k = 0; k < 2000; ++k) {
-        state = Update(kind, Predict(state, n[0], n[1]), At(0, 0, n[2])).state;
-      }
-      for (int axis = 0; axis < 2; ++axis) {
-        const double pp = state.P(axis, axis);
-        const double pv = state.P(axis, axis + 2);
-        const double vv = state.P(axis + 2, axis + 2);
-        // K = P C' R^-1 with the updated P.
-        EXPECT_NEAR(pp / n[2], n[3], 1e-6 * n[3]) << line;
-        EXPECT_NEAR(pv / n[2], n[4], 1e-6 * n[4]) << line;
-        EXPECT_NEAR(pp, n[5], 1e-6 * n[5]) << line;
-        EXPECT_NEAR(pv, n[6], 1e-6 * n[6]) << line;
-        EXPECT_NEAR(vv, n[7], 1e-6 * n[7]) << line;
-      }
-    }
+  for (const FilterKind kind : {FilterKind::kPerAxis, FilterKind::kFourState}) {
+    const auto errors = testing::SteadyStateErrors(kReference, kind);
+    if (errors.empty()) GTEST_SKIP() << "no shared reference numbers";
+    EXPECT_EQ(errors.size(), 4u);
+    for (const auto& [row, error] : errors) EXPECT_LE(error, 1e-6) << row;
   }
-  EXPECT_EQ(rows, 4);
 }
 
 TEST(Update, CovarianceStaysPositiveDefiniteOverRandomSteps) {

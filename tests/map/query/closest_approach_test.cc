@@ -10,13 +10,13 @@
 #include "map/contacts/contact_map.h"
 #include "map/query/disc_probability.h"
 #include "tests/map/contacts/contact_testing.h"
-#include "tests/testing/shared_numbers.h"
+#include "tests/testing/contact_reference.h"
 
 namespace fathom::map {
 namespace {
 
 constexpr double kRadPerDeg = std::numbers::pi / 180;
-constexpr double kKnotMPerS = 1852.0 / 3600;
+const std::string kReference = FATHOM_SHARED_DATA_DIR "/reference";
 
 Eigen::Vector2d Along(double length, double course_deg) {
   return {length * std::cos(course_deg * kRadPerDeg),
@@ -44,110 +44,26 @@ TEST(FindApproach, MatchesTheSumByHand) {
       50);
 }
 
-// Range, bearing and both speeds of 35 designed encounters with TCPA and DCPA
-// computed elsewhere; the target's course is not told. One course must give
-// both.
 TEST(FindApproach, MatchesTheDesignedEncounters) {
-  const auto lines =
-      testing::LinesOf(FATHOM_SHARED_DATA_DIR "/reference/cpa_encounters.csv");
-  if (lines.empty()) GTEST_SKIP() << "no cpa_encounters.csv";
-  int compared = 0;
-  for (std::size_t i = 1; i < lines.size(); ++i) {
-    // The title is in quotes and may hold a comma.
-    const std::size_t quote = lines[i].rfind('"');
-    const auto n = testing::NumbersIn(lines[i].substr(quote + 1));
-    ASSERT_EQ(n.size(), 7u) << lines[i];
-    const Eigen::Vector2d offset = Along(n[0], n[1]);
-    const Eigen::Vector2d own = Along(n[5] * kKnotMPerS, 0);
-    const auto missed = [&](double course_deg) {
-      const PlaneApproach approach = FindApproach(
-          {.offset_m = offset,
-           .velocity_m_s = Along(n[6] * kKnotMPerS, course_deg) - own});
-      // In units of 0.001 minute and 0.2 m: bearings are told to 0.001 degree,
-      // half of which is 0.13 m at 14.8 km.
-      return std::max(std::fabs(approach.tcpa_s / 60 - n[2]) / 0.001,
-                      std::fabs(approach.distance_m - n[3]) / 0.2);
-    };
-    double best_deg = 0;
-    for (double step = 0.002, low = 0, high = 360; step > 1e-6; step /= 20) {
-      for (double course = low; course <= high; course += step) {
-        if (missed(course) < missed(best_deg)) best_deg = course;
-      }
-      low = best_deg - step;
-      high = best_deg + step;
-    }
-    EXPECT_LT(missed(best_deg), 1) << lines[i];
-    ++compared;
-  }
-  EXPECT_EQ(compared, 35);
+  const auto errors = testing::EncounterErrors(kReference);
+  if (errors.empty()) GTEST_SKIP() << "no cpa_encounters.csv";
+  EXPECT_EQ(errors.size(), 35u);
+  for (const auto& [row, error] : errors) EXPECT_LT(error, 1) << row;
 }
 
-// Where a great circle of a sphere leads.
-GeodeticPoint OnSphere(const GeodeticPoint& from, double course_deg,
-                       double way_m) {
-  constexpr double kMeanRadiusM = 6'371'008.771415;  // The reference's.
-  const double a = way_m / kMeanRadiusM;
-  const double lat = from.latitude_deg * kRadPerDeg;
-  const double course = course_deg * kRadPerDeg;
-  const double sin_there = std::sin(lat) * std::cos(a) +
-                           std::cos(lat) * std::sin(a) * std::cos(course);
-  const double turn = std::atan2(std::sin(course) * std::sin(a) * std::cos(lat),
-                                 std::cos(a) - std::sin(lat) * sin_there);
-  return {.latitude_deg = std::asin(sin_there) / kRadPerDeg,
-          .longitude_deg = from.longitude_deg + turn / kRadPerDeg};
-}
-
-// Two on great circles of a sphere, computed elsewhere, taken up ten minutes
-// before their CPA (the aircraft flies 154 m/s: the track is put in place, no
-// report would be believed). Ours are on the ellipsoid, whose radii of
-// curvature there (6344 km north, 6381 km east) are up to 0.43 % off the
-// sphere's: of 124 km apart that is 550 m, of 93 km flown, at 146 m/s, 2.7 s.
-// North is shortened against east by 0.58 %, so what is at right angles on the
-// sphere is off by up to 0.0058: of 124 km 720 m along the way, 4.9 s.
+// Ours are on the ellipsoid, whose radii of curvature there (6344 km north,
+// 6381 km east) are up to 0.43 % off the sphere's: of 124 km apart that is
+// 550 m, of 93 km flown, at 146 m/s, 2.7 s. North is shortened against east by
+// 0.58 %, so what is at right angles on the sphere is off by up to 0.0058: of
+// 124 km 720 m along the way, 4.9 s.
 TEST(ClosestApproach, MatchesTheEncounterOnTheSphere) {
-  const auto lines =
-      testing::LinesOf(FATHOM_SHARED_DATA_DIR "/reference/jord_cpa.csv");
-  if (lines.empty()) GTEST_SKIP() << "no jord_cpa.csv";
-  int compared = 0;
-  for (const std::string& line : lines) {
-    if (line.starts_with("#") || line.starts_with("own_lat")) continue;
-    const auto n = testing::NumbersIn(line);
-    ASSERT_EQ(n.size(), 14u) << line;
-    const double tcpa_s = n[8];
-    const auto own_at = [&n](double t_s) {
-      return OnSphere({n[0], n[1]}, n[2], n[3] * kKnotMPerS * t_s);
-    };
-    const auto target_at = [&n](double t_s) {
-      return OnSphere({n[4], n[5]}, n[6], n[7] * kKnotMPerS * t_s);
-    };
-    // The way there is the reference's.
-    ASSERT_NEAR(own_at(tcpa_s).latitude_deg, n[10], 1e-6);
-    ASSERT_NEAR(own_at(tcpa_s).longitude_deg, n[11], 1e-6);
-    ASSERT_NEAR(target_at(tcpa_s).latitude_deg, n[12], 1e-6);
-    ASSERT_NEAR(target_at(tcpa_s).longitude_deg, n[13], 1e-6);
-
-    ContactPoint begin;
-    begin.contact_class = ContactClass::kVessel;
-    begin.status = ContactStatus::kActive;
-    begin.time = begin.report_time = begin.track_start = AtS(0);
-    begin.frame_origin = target_at(tcpa_s - 600);
-    const double azimuth_deg =
-        Inverse(begin.frame_origin, target_at(tcpa_s)).azimuth_deg;
-    begin.x.tail<2>() = Along(n[7] * kKnotMPerS, azimuth_deg);
-    begin.P = Eigen::Matrix4d::Identity();
-    Contact target(Key("jord"));
-    target.history().Append(begin);
-    const TimedPlace path[] = {{own_at(tcpa_s - 600), AtS(0)},
-                               {own_at(tcpa_s), AtS(600)},
-                               {own_at(tcpa_s + 600), AtS(1200)}};
-    const auto approach = ClosestApproach(target, DefaultContactClasses(), path,
-                                          {.within_m = 100});
-    ASSERT_TRUE(approach.has_value());
-    EXPECT_NEAR(ToSeconds(approach->time - AtS(0)), 600, 8);
-    EXPECT_NEAR(approach->distance_m, n[9], 550);
-    ++compared;
+  const auto errors = testing::SphereEncounterErrors(kReference);
+  if (errors.empty()) GTEST_SKIP() << "no jord_cpa.csv";
+  for (const testing::SphereError& error : errors) {
+    EXPECT_LT(error.place_deg, 1e-6);  // The way there is the reference's.
+    EXPECT_LT(error.time_s, 8);
+    EXPECT_LT(error.distance_m, 550);
   }
-  EXPECT_GE(compared, 1);
 }
 
 TEST(PassProbability, WithoutWayIsTheDiscs) {
