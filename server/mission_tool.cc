@@ -91,12 +91,17 @@ absl::Status Info(const std::string& path, Result& out) {
   out.Count("file_bytes", info.file_bytes);
   out.Count("wal_bytes", info.wal_bytes);
   out.Count("checkpoint_revision", info.checkpoint_revision);
-  out.Count("tiles", info.tiles);
-  out.Count("activities", info.activities);
-  out.Count("contacts", info.contacts);
-  out.Count("history_rows", info.history_rows);
-  out.Count("journal_records", info.journal_records);
-  return absl::OkStatus();
+  const auto count = [&out](const char* name,
+                            const std::optional<std::uint64_t>& value) {
+    if (value.has_value()) out.Count(name, *value);
+  };
+  count("tiles", info.tiles);
+  count("activities", info.activities);
+  count("contacts", info.contacts);
+  count("history_rows", info.history_rows);
+  count("journal_records", info.journal_records);
+  out.List("damage", info.damage);
+  return info.damage.empty() ? absl::OkStatus() : Damaged();
 }
 
 absl::Status Verify(const std::string& path, Result& out) {

@@ -68,42 +68,49 @@ absl::StatusOr<std::vector<ContactHistoryRow>> ReplayedHistory(
   return ReplayHistory(loaded);
 }
 
-// Counts contacts and rows of the history; of a damaged journal none.
-absl::Status CountHistory(Connection& connection, MissionInfo& info) {
-  const bool blocks = info.format_version >= kFirstBlockVersion;
+// What the blocks hold, and what the journal adds to the contacts and to that.
+struct HistoryCount {
+  std::int64_t rows = 0;
+  std::uint64_t more_contacts = 0;
+};
+
+absl::StatusOr<HistoryCount> CountHistory(Connection& connection,
+                                          int format_version) {
+  HistoryCount count;
+  if (format_version < kFirstBlockVersion) {
+    FATHOM_ASSIGN_OR_RETURN(
+        count.rows,
+        connection.QueryInt("SELECT count(*) FROM contact_history"));
+    return count;
+  }
   FATHOM_ASSIGN_OR_RETURN(
-      const std::int64_t stored,
-      connection.QueryInt(
-          blocks ? "SELECT estimate_count FROM contact_history_total"
-                 : "SELECT count(*) FROM contact_history"));
-  info.history_rows = static_cast<std::uint64_t>(stored);
-  if (!blocks) return absl::OkStatus();
-  const auto replayed = ReplayedHistory(connection);
-  if (absl::IsDataLoss(replayed.status())) return absl::OkStatus();
-  FATHOM_RETURN_IF_ERROR(replayed.status());
+      count.rows,
+      connection.QueryInt("SELECT estimate_count FROM contact_history_total"));
+  FATHOM_ASSIGN_OR_RETURN(const std::vector<ContactHistoryRow> replayed,
+                          ReplayedHistory(connection));
   FATHOM_ASSIGN_OR_RETURN(const HistoryTails tails,
-                          FindTails(connection, *replayed));
+                          FindTails(connection, replayed));
   FATHOM_ASSIGN_OR_RETURN(ContactTable contacts,
                           ContactTable::Create(connection));
   for (const auto& [key, tail] : tails) {
-    info.history_rows += tail.rows.size();
+    count.rows += static_cast<std::int64_t>(tail.rows.size());
     FATHOM_ASSIGN_OR_RETURN(const auto number, contacts.FindNumber(key));
     if (!number.has_value()) {
-      ++info.contacts;
+      ++count.more_contacts;
     } else if (tail.cut.has_value()) {
       FATHOM_ASSIGN_OR_RETURN(
           const HistoryBlocks cut,
           FindBlocksOf(connection, *number, key, *tail.cut, Time::max()));
       FATHOM_RETURN_IF_ERROR(ReadBlocks(connection, cut, {}, *tail.cut,
                                         Time::max(),
-                                        [&info](const ContactHistoryRow&) {
-                                          --info.history_rows;
+                                        [&count](const ContactHistoryRow&) {
+                                          --count.rows;
                                           return true;
                                         })
                                  .status());
     }
   }
-  return absl::OkStatus();
+  return count;
 }
 
 // Copies what can be decoded of the history. Closing `to` writes what waits.
@@ -279,27 +286,41 @@ absl::StatusOr<MissionInfo> ReadInfo(const std::string& path) {
   Connection& connection = mission.connection;
   MissionInfo info;
   FATHOM_ASSIGN_OR_RETURN(info.metadata, ReadMetadata(connection));
-  const auto count = [&](std::uint64_t& out,
-                         std::string_view sql) -> absl::Status {
-    FATHOM_ASSIGN_OR_RETURN(const std::int64_t value, connection.QueryInt(sql));
-    out = static_cast<std::uint64_t>(value);
-    return absl::OkStatus();
-  };
   FATHOM_ASSIGN_OR_RETURN(const std::int64_t version,
                           connection.QueryInt("PRAGMA user_version"));
   info.format_version = static_cast<int>(version);
   info.file_bytes = SizeOf(path);
   info.wal_bytes = SizeOf(path + "-wal");
-  FATHOM_RETURN_IF_ERROR(count(info.checkpoint_revision,
-                               "SELECT checkpoint_revision FROM mission"));
+  FATHOM_ASSIGN_OR_RETURN(
+      const std::int64_t checkpoint,
+      connection.QueryInt("SELECT checkpoint_revision FROM mission"));
+  info.checkpoint_revision = static_cast<std::uint64_t>(checkpoint);
+
+  const auto note = [&info](const absl::Status& status) {
+    if (!absl::IsDataLoss(status)) return status;
+    info.damage.push_back(std::string(status.message()));
+    return absl::OkStatus();
+  };
+  const auto count = [&](std::optional<std::uint64_t>& out,
+                         std::string_view sql) -> absl::Status {
+    const absl::StatusOr<std::int64_t> value = connection.QueryInt(sql);
+    if (value.ok()) out = static_cast<std::uint64_t>(*value);
+    return note(value.status());
+  };
   FATHOM_RETURN_IF_ERROR(count(info.tiles, "SELECT count(*) FROM tile"));
   FATHOM_RETURN_IF_ERROR(
       count(info.activities, "SELECT count(*) FROM activity"));
   FATHOM_RETURN_IF_ERROR(count(info.contacts, "SELECT count(*) FROM contact"));
-  FATHOM_RETURN_IF_ERROR(CountHistory(connection, info));
   FATHOM_RETURN_IF_ERROR(
       count(info.journal_records,
             "SELECT ifnull(sum(record_count), 0) FROM journal"));
+  const absl::StatusOr<HistoryCount> history =
+      CountHistory(connection, info.format_version);
+  FATHOM_RETURN_IF_ERROR(note(history.status()));
+  if (history.ok()) {
+    info.history_rows = static_cast<std::uint64_t>(history->rows);
+    if (info.contacts.has_value()) *info.contacts += history->more_contacts;
+  }
   return info;
 }
 

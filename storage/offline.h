@@ -23,17 +23,20 @@
 
 namespace fathom::storage {
 
+// What can be counted without reading all of it; what is unset could not be.
 struct MissionInfo {
   MissionMetadata metadata;
   int format_version = 0;
   std::uint64_t file_bytes = 0;
   std::uint64_t wal_bytes = 0;
   std::uint64_t checkpoint_revision = 0;
-  std::uint64_t tiles = 0;
-  std::uint64_t activities = 0;
-  std::uint64_t contacts = 0;
-  std::uint64_t history_rows = 0;
-  std::uint64_t journal_records = 0;
+  std::optional<std::uint64_t> tiles;
+  std::optional<std::uint64_t> activities;
+  std::optional<std::uint64_t> contacts;
+  std::optional<std::uint64_t> history_rows;
+  std::optional<std::uint64_t> journal_records;
+  // Why not all of them are there. ProveFile tells of all damage.
+  std::vector<std::string> damage;
 };
 
 absl::StatusOr<MissionInfo> ReadInfo(const std::string& path);

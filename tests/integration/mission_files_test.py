@@ -94,6 +94,10 @@ class MissionFiles(LiveTest):
         proof = self.verb("verify", self.path, code=4)
         self.assertEqual(proof["sound"], "no")
         self.assertTrue(any("checksum" in p for p in proof["problems"]))
+        info = self.verb("info", self.path, code=4)
+        self.assertNotIn("tiles", info)
+        self.assertIn("checksum", info["damage"][0])
+        self.assertEqual(info["history_rows"], 19)
         fixed = self.folder / "fixed.fathom"
         before = hashlib.sha256(self.path.read_bytes()).hexdigest()
         repair = self.verb("repair", self.path, fixed)

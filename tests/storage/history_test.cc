@@ -34,6 +34,7 @@ using ::fathom::testing::StatusIs;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::SizeIs;
 
 Time At(int s) {
   return TimeFromUnixMicros(1'000'000'000'000'000 + s * 1'000'000ll);
@@ -415,6 +416,23 @@ TEST_F(HistoryFileTest, NothingIsReadAfterClose) {
               StatusIs(absl::StatusCode::kFailedPrecondition));
 }
 
+// A copy of the mission with one byte changed in the first page of a table or
+// index.
+std::string CopyWithDamage(const std::string& path, const std::string& of) {
+  const std::string damaged = path + "." + of;
+  std::filesystem::copy_file(path, damaged);
+  std::int64_t page = 0;
+  {
+    auto connection = Connection::Open(path, Connection::Mode::kReadOnly);
+    page = *connection->QueryInt(
+        "SELECT rootpage FROM sqlite_schema WHERE name = '" + of + "'");
+  }
+  std::fstream bytes(damaged, std::ios::in | std::ios::out | std::ios::binary);
+  bytes.seekp((page - 1) * 8192 + 4000);
+  bytes.put('x');
+  return damaged;
+}
+
 // Of one damaged page of what is beside the blocks: they are kept all the same.
 TEST_F(HistoryFileTest, RepairNeedsTheBlocksAlone) {
   for (int i = 0; i < 1000; ++i) {
@@ -425,24 +443,7 @@ TEST_F(HistoryFileTest, RepairNeedsTheBlocksAlone) {
   file_.reset();
   for (const std::string page_of :
        {"contact_history_total", "sqlite_autoindex_contact_1"}) {
-    std::int64_t page = 0;
-    {
-      FATHOM_ASSERT_OK_AND_ASSIGN(
-          Connection connection,
-          Connection::Open(path(), Connection::Mode::kReadOnly));
-      FATHOM_ASSERT_OK_AND_ASSIGN(
-          page, connection.QueryInt(
-                    "SELECT rootpage FROM sqlite_schema WHERE name = '" +
-                    page_of + "'"));
-    }
-    const std::string damaged = dir_.File(page_of);
-    std::filesystem::copy_file(path(), damaged);
-    {
-      std::fstream bytes(damaged,
-                         std::ios::in | std::ios::out | std::ios::binary);
-      bytes.seekp((page - 1) * 8192 + 4000);
-      bytes.put('x');
-    }
+    const std::string damaged = CopyWithDamage(path(), page_of);
     FATHOM_ASSERT_OK_AND_ASSIGN(const Repair repair,
                                 RepairMission(damaged, damaged + ".repaired"));
     EXPECT_EQ(repair.history_rows, 1000u) << page_of;
@@ -451,6 +452,40 @@ TEST_F(HistoryFileTest, RepairNeedsTheBlocksAlone) {
     ExpectKept(*mended);
     EXPECT_EQ(mended->Status().history.estimates, 1000u) << page_of;
   }
+}
+
+TEST_F(HistoryFileTest, WhatCannotBeCountedIsToldAndTheRestIsCounted) {
+  for (int i = 0; i < 6; ++i) {
+    Report(SampleReport(i, "c" + std::to_string(i % 3)));
+  }
+  Commit(false);
+  ASSERT_THAT(file_->Close(), IsOk());
+  file_.reset();
+  const auto info_of = [this](const char* damaged) {
+    return ReadInfo(CopyWithDamage(path(), damaged));
+  };
+  FATHOM_ASSERT_OK_AND_ASSIGN(const MissionInfo sound, ReadInfo(path()));
+  EXPECT_TRUE(sound.damage.empty());
+  EXPECT_EQ(sound.history_rows, 6u);
+  EXPECT_EQ(sound.contacts, 3u);
+  FATHOM_ASSERT_OK_AND_ASSIGN(const MissionInfo total,
+                              info_of("contact_history_total"));
+  EXPECT_THAT(total.damage, ElementsAre(HasSubstr("checksum")));
+  EXPECT_EQ(total.history_rows, std::nullopt);
+  EXPECT_EQ(total.contacts, 3u);
+  EXPECT_EQ(total.journal_records, sound.journal_records);
+  FATHOM_ASSERT_OK_AND_ASSIGN(const MissionInfo tiles, info_of("tile"));
+  EXPECT_THAT(tiles.damage, ElementsAre(HasSubstr("checksum")));
+  EXPECT_EQ(tiles.tiles, std::nullopt);
+  EXPECT_EQ(tiles.history_rows, 6u);
+  // The history may go on in it.
+  FATHOM_ASSERT_OK_AND_ASSIGN(const MissionInfo journal, info_of("journal"));
+  EXPECT_THAT(journal.damage, SizeIs(2));
+  EXPECT_EQ(journal.journal_records, std::nullopt);
+  EXPECT_EQ(journal.history_rows, std::nullopt);
+  EXPECT_EQ(journal.tiles, sound.tiles);
+  // Who it is has to be known.
+  EXPECT_THAT(info_of("mission"), StatusIs(absl::StatusCode::kDataLoss));
 }
 
 TEST_F(HistoryFileTest, WhatIsMoreThanAllowedGoesOldestFirst) {
