@@ -9,8 +9,8 @@ import unittest
 import grpc
 
 from live_server import (DEADLINE_S, LiveTest, at, fix_report, import_chart,
-                         obstacle, point, report_contacts, start_activity,
-                         wait_until)
+                         ingest, obstacle, point, report_contacts,
+                         start_activity, wait_until)
 from questions_test import path, search
 
 TICK_S = 1 / os.sysconf("SC_CLK_TCK")
@@ -119,6 +119,28 @@ class Cancelled(LiveTest):
                 server, "QueryObstacles",
                 lambda timeout: server.obstacle.QueryObstacles.future(
                     batch, timeout=timeout))
+
+    def test_a_history_is_not_read_for_nobody(self):
+        reports = 30_000
+        with self.new_mission() as server:
+            list(server.ingest.StreamContacts(
+                (ingest.StreamContactsRequest(report=fix_report(
+                    k, 0, 5 * k, second=k)) for k in range(1, reports + 1)),
+                timeout=DEADLINE_S))
+            request = obstacle.GetContactHistoryRequest
+            ways = {
+                "of one contact": request(source_id="c4i", contact_id="ship"),
+                "of an area": request(south_west=point(-1000, -1000),
+                                      north_east=point(1000, 5 * reports))}
+            for name, way in ways.items():
+                self.assertEqual(sum(
+                    len(part.estimates) for part in
+                    server.obstacle.GetContactHistory(way)), reports, name)
+                self.assert_ends_early(
+                    server, f"GetContactHistory {name}",
+                    lambda timeout, way=way:
+                    server.obstacle.GetContactHistory(way, timeout=timeout),
+                    read=list)
 
 
 if __name__ == "__main__":
