@@ -9,6 +9,14 @@
 //   ack_p50_ms ack_p99_ms      from a ping's sending to its durable ack
 //   pings_per_s reports_per_s transfers
 //
+// With --null the null server (null_server.cc) is then asked alone and beside
+// one stream of pings at the rate that fathomd reached: what the same stream
+// costs a question where nothing is done with it, on the same cores in the same
+// minute.
+//
+//   null_idle_p50_us null_idle_p99_us null_query_p50_us null_query_p99_us
+//   null_pings_per_s
+//
 // The caller waits a millisecond between questions, as a planner does: it
 // measures latency, not how fast it can load the server itself.
 #include <grpcpp/grpcpp.h>
@@ -39,6 +47,12 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 using Seconds = std::chrono::duration<double>;
+
+// Of a window's parts.
+struct Lengths {
+  double idle_s = 2;
+  double loaded_s = 5;
+};
 
 double Since(SteadyClock::time_point start) {
   return Seconds(SteadyClock::now() - start).count();
@@ -236,23 +250,53 @@ class SideLoad {
   std::thread transfers_;
 };
 
-absl::Status Run(const std::string& address, double rate, double seconds,
-                 double idle_s, int windows) {
+// Asks the null server alone, then beside a stream of `rate` pings a second;
+// adds what it measures to `window`.
+absl::Status AskNull(const client::Client& null,
+                     const std::shared_ptr<grpc::Channel>& channel, double rate,
+                     std::uint64_t epoch, const Lengths& lengths,
+                     nlohmann::json& window) {
+  FATHOM_ASSIGN_OR_RETURN(std::vector<double> idle,
+                          AskFor(null, lengths.idle_s));
+  const auto start = SteadyClock::now();
+  PingLoad pings(channel, rate, epoch);
+  auto loaded = AskFor(null, lengths.loaded_s);
+  pings.Stop();
+  const double lasted_s = Since(start);
+  FATHOM_RETURN_IF_ERROR(loaded.status());
+  window["null_idle_p50_us"] = Quantile(idle, 0.5);
+  window["null_idle_p99_us"] = Quantile(idle, 0.99);
+  window["null_query_p50_us"] = Quantile(*loaded, 0.5);
+  window["null_query_p99_us"] = Quantile(*loaded, 0.99);
+  window["null_pings_per_s"] = static_cast<double>(pings.sent()) / lasted_s;
+  return absl::OkStatus();
+}
+
+absl::Status Run(const std::string& address, const std::string& null_address,
+                 double rate, const Lengths& lengths, int windows) {
   FATHOM_ASSIGN_OR_RETURN(const auto planner,
                           client::Client::Connect(address, {}));
   FATHOM_ASSIGN_OR_RETURN(const auto other,
                           client::Client::Connect(address, {}));
   const auto channel =
       grpc::CreateChannel(address, grpc::InsecureChannelCredentials());
+  std::unique_ptr<client::Client> null;
+  std::shared_ptr<grpc::Channel> null_channel;
+  if (!null_address.empty()) {
+    FATHOM_ASSIGN_OR_RETURN(null, client::Client::Connect(null_address, {}));
+    null_channel =
+        grpc::CreateChannel(null_address, grpc::InsecureChannelCredentials());
+  }
   FATHOM_RETURN_IF_ERROR(PrepareScene(*planner, 2000));
   FATHOM_RETURN_IF_ERROR(AskFor(*planner, 0.2).status());
   for (int window = 1; window <= windows; ++window) {
-    FATHOM_ASSIGN_OR_RETURN(std::vector<double> idle, AskFor(*planner, idle_s));
+    FATHOM_ASSIGN_OR_RETURN(std::vector<double> idle,
+                            AskFor(*planner, lengths.idle_s));
     const auto start = SteadyClock::now();
     const auto epoch = static_cast<std::uint64_t>(window);
     PingLoad pings(channel, rate, epoch);
     SideLoad side(*other, *other, epoch);
-    auto loaded = AskFor(*planner, seconds);
+    auto loaded = AskFor(*planner, lengths.loaded_s);
     pings.Stop();
     const double lasted_s = Since(start);
     FATHOM_RETURN_IF_ERROR(side.Stop());
@@ -260,21 +304,24 @@ absl::Status Run(const std::string& address, double rate, double seconds,
     if (!pings.status().ok()) {
       return absl::InternalError("pings: " + pings.status().error_message());
     }
-    std::cout << nlohmann::json{{"window", window},
-                                {"idle_p50_us", Quantile(idle, 0.5)},
-                                {"idle_p99_us", Quantile(idle, 0.99)},
-                                {"query_p50_us", Quantile(*loaded, 0.5)},
-                                {"query_p99_us", Quantile(*loaded, 0.99)},
-                                {"ack_p50_ms", Quantile(pings.ack_ms(), 0.5)},
-                                {"ack_p99_ms", Quantile(pings.ack_ms(), 0.99)},
-                                {"pings", pings.sent()},
-                                {"pings_per_s",
-                                 static_cast<double>(pings.sent()) / lasted_s},
-                                {"reports_per_s",
-                                 static_cast<double>(side.reports()) /
-                                     lasted_s},
-                                {"transfers", side.transfers()}}
-              << std::endl;
+    const double reached_per_s = static_cast<double>(pings.sent()) / lasted_s;
+    nlohmann::json row = {
+        {"window", window},
+        {"idle_p50_us", Quantile(idle, 0.5)},
+        {"idle_p99_us", Quantile(idle, 0.99)},
+        {"query_p50_us", Quantile(*loaded, 0.5)},
+        {"query_p99_us", Quantile(*loaded, 0.99)},
+        {"ack_p50_ms", Quantile(pings.ack_ms(), 0.5)},
+        {"ack_p99_ms", Quantile(pings.ack_ms(), 0.99)},
+        {"pings", pings.sent()},
+        {"pings_per_s", reached_per_s},
+        {"reports_per_s", static_cast<double>(side.reports()) / lasted_s},
+        {"transfers", side.transfers()}};
+    if (null != nullptr) {
+      FATHOM_RETURN_IF_ERROR(
+          AskNull(*null, null_channel, reached_per_s, epoch, lengths, row));
+    }
+    std::cout << row << std::endl;
   }
   return absl::OkStatus();
 }
@@ -282,20 +329,22 @@ absl::Status Run(const std::string& address, double rate, double seconds,
 int Main(int argc, char** argv) {
   CLI::App app{"Loads a live fathomd with everything at once."};
   std::string server;
+  std::string null;
   double rate = 0;
-  double seconds = 5;
-  double idle_s = 2;
+  Lengths lengths;
   int windows = 1;
   app.add_option("--server", server, "fathomd, host:port")->required();
+  app.add_option("--null", null, "fathom-null-server, host:port");
   app.add_option("--pings-per-s", rate, "0: as fast as it takes them")
       ->capture_default_str();
-  app.add_option("--seconds", seconds, "Of load in each window")
+  app.add_option("--seconds", lengths.loaded_s, "Of load in each window")
       ->capture_default_str();
-  app.add_option("--idle-seconds", idle_s, "Before the load in each window")
+  app.add_option("--idle-seconds", lengths.idle_s,
+                 "Before the load in each window")
       ->capture_default_str();
   app.add_option("--windows", windows, "How many")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
-  const absl::Status status = Run(server, rate, seconds, idle_s, windows);
+  const absl::Status status = Run(server, null, rate, lengths, windows);
   if (!status.ok()) {
     std::cerr << "mixed_load: " << status.ToString() << "\n";
     return 1;
