@@ -121,7 +121,7 @@ class Cancelled(LiveTest):
                     batch, timeout=timeout))
 
     def test_a_history_is_not_read_for_nobody(self):
-        reports = 30_000
+        reports = 60_000
         with self.new_mission() as server:
             list(server.ingest.StreamContacts(
                 (ingest.StreamContactsRequest(report=fix_report(
