@@ -419,7 +419,7 @@ TEST_F(HistoryFileTest, NothingIsReadAfterClose) {
 // A copy of the mission with one byte changed in the first page of a table or
 // index.
 std::string CopyWithDamage(const std::string& path, const std::string& of) {
-  const std::string damaged = path + "." + of;
+  std::string damaged = path + "." + of;
   std::filesystem::copy_file(path, damaged);
   std::int64_t page = 0;
   {
