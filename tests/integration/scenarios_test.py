@@ -97,6 +97,43 @@ class Scenarios(LiveTest):
             # And the ferry.
             self.assertEqual(len(result["survey"]["ships"]), 201)
 
+    def test_wreck_inspection(self):
+        with self.server() as server:
+            out = self.folder / "evaluation"
+            result = self.scenario("wreck_inspection", server.address, "--out",
+                                   out)
+        with open(out / "places.csv", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        # Well inside the wreck: 60 m by 12 m at 45 degrees about (300, 300).
+        wreck = []
+        for row in rows:
+            north, east = (float(row[key]) - 300
+                           for key in ("north_m", "east_m"))
+            if abs(north + east) < 25 and abs(north - east) < 5:
+                wreck.append(row)
+        # 20 000 places over 360 000 m^2, 35.4 m by 7.1 m of which are asked
+        # for: 14.
+        self.assertGreaterEqual(len(wreck), 7)
+        for row in wreck:
+            self.assertEqual(row["kind"], "MEASURED")
+            # It is 6 m high; 2 m cells far from its sides do not mix.
+            self.assertLess(abs(float(row["mean_m"]) - float(row["truth_m"])),
+                            1)
+        # The shadow gets to where the vehicle was one look of 20 s ago: at
+        # 2 m/s 40 m behind it; and the last ping is up to 0.5 s, 1 m, before
+        # the way's end in (60, 60).
+        shadow = result["survey"]["ships"][0]
+        end_s = (result["survey"]["pings"] - 1) * 0.5
+        north, east = shadow["start_north_m"], shadow["start_east_m"]
+        changes = [{"at_s": 0} | {key: shadow[key] for key in (
+            "velocity_north_m_s", "velocity_east_m_s")},
+                   *shadow["course_changes"]]
+        for change, after in zip(changes, [*changes[1:], {"at_s": end_s}]):
+            seconds = after["at_s"] - change["at_s"]
+            north += seconds * change["velocity_north_m_s"]
+            east += seconds * change["velocity_east_m_s"]
+        self.assertLess(math.hypot(north - 60, east - 60), 41.01)
+
     def test_bad_day_with_a_link_that_is_cut(self):
         with self.server() as server:
             whole = self.scenario("bad_day", server.address, "--epoch", 1)

@@ -188,7 +188,7 @@ TEST(LoadScenario, TheShippedOnesAreGood) {
     EXPECT_FALSE(file.expectations.empty());
     ++files;
   }
-  EXPECT_EQ(files, 6);
+  EXPECT_EQ(files, 7);
 }
 
 TEST(Missed, SaysWhichAndByHowMuch) {
