@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -22,10 +23,16 @@
 namespace fathom::client {
 namespace {
 
-constexpr std::string_view kMagic = "FTHMSPL1";
+constexpr std::string_view kMagic = "FTHMSPL2";
+constexpr std::string_view kMagicWithoutMarks = "FTHMSPL1";
 constexpr std::size_t kSourceBytes = 64;
 constexpr std::size_t kHeaderBytes = 8 + 8 + 8 + kSourceBytes + 4;
 constexpr std::size_t kFrameBytes = 8;
+// No count of messages reaches it.
+constexpr std::uint64_t kMostSequence = std::uint64_t{1} << 63;
+// In place of a size.
+constexpr std::uint32_t kMarkWord = 0xFFFFFFFF;
+constexpr std::size_t kMarkBytes = kFrameBytes + 8;
 // A segment is an eighth of the whole, at most this: small enough that room
 // comes back soon, large enough that files are few.
 constexpr std::uint64_t kMostSegmentBytes = 8u << 20;
@@ -133,6 +140,7 @@ struct Header {
   std::uint64_t epoch;
   std::uint64_t first;
   std::string source_id;
+  bool has_marks = true;
 };
 
 std::string Encode(const Header& header) {
@@ -147,15 +155,24 @@ std::string Encode(const Header& header) {
 }
 
 std::optional<Header> DecodeHeader(std::string_view bytes) {
-  if (bytes.size() < kHeaderBytes || !bytes.starts_with(kMagic) ||
+  const bool has_marks = bytes.starts_with(kMagic);
+  if (bytes.size() < kHeaderBytes ||
+      !(has_marks || bytes.starts_with(kMagicWithoutMarks)) ||
       Crc(bytes.substr(0, kHeaderBytes - 4)) !=
           GetWord<std::uint32_t>(bytes.data() + kHeaderBytes - 4)) {
     return std::nullopt;
   }
   const std::string_view source = bytes.substr(24, kSourceBytes);
-  return Header{.epoch = GetWord<std::uint64_t>(bytes.data() + 8),
-                .first = GetWord<std::uint64_t>(bytes.data() + 16),
-                .source_id = std::string(source.substr(0, source.find('\0')))};
+  Header header = {
+      .epoch = GetWord<std::uint64_t>(bytes.data() + 8),
+      .first = GetWord<std::uint64_t>(bytes.data() + 16),
+      .source_id = std::string(source.substr(0, source.find('\0'))),
+      .has_marks = has_marks};
+  if (header.epoch == 0 || header.first == 0 || header.first > kMostSequence ||
+      header.source_id.empty()) {
+    return std::nullopt;
+  }
+  return header;
 }
 
 absl::Status NothingThere(const SpoolOptions& options) {
@@ -163,23 +180,53 @@ absl::Status NothingThere(const SpoolOptions& options) {
       "the folder %s holds no buffered %s", options.folder, options.kind));
 }
 
-// A message at the head of `bytes`.
-enum class Frame { kWhole, kShort, kDamaged };
+std::string Framed(std::uint32_t size_word, std::string_view content) {
+  std::string frame(kFrameBytes, '\0');
+  PutWord(size_word, frame.data());
+  PutWord(Crc(content), frame.data() + 4);
+  return frame.append(content);
+}
+
+std::string EncodeMark(std::uint64_t synced_bytes) {
+  std::string content(8, '\0');
+  PutWord(synced_bytes, content.data());
+  return Framed(kMarkWord, content);
+}
+
+// What stands at the head of `bytes`, and the size of its content.
+enum class Frame { kWhole, kMark, kShort, kDamaged };
 Frame LookAtFrame(std::string_view bytes, std::size_t& size) {
   if (bytes.size() < kFrameBytes) return Frame::kShort;
   size = GetWord<std::uint32_t>(bytes.data());
   if (size == 0) return Frame::kDamaged;
+  const bool is_mark = size == kMarkWord;
+  if (is_mark) size = kMarkBytes - kFrameBytes;
   if (bytes.size() < kFrameBytes + size) return Frame::kShort;
-  return Crc(bytes.substr(kFrameBytes, size)) ==
-                 GetWord<std::uint32_t>(bytes.data() + 4)
-             ? Frame::kWhole
-             : Frame::kDamaged;
+  if (Crc(bytes.substr(kFrameBytes, size)) !=
+      GetWord<std::uint32_t>(bytes.data() + 4)) {
+    return Frame::kDamaged;
+  }
+  return is_mark ? Frame::kMark : Frame::kWhole;
 }
 
-// Whether these bytes at the end of the last segment, which begin with no
-// whole message, are all that is left of one: at most zeros are behind it (a
-// power cut that spared the file's size), and no whole message in it (a size
-// that was damaged).
+// Whether a mark in `bytes` says that more than `offset` of the file was
+// synced.
+bool WasSynced(std::string_view bytes, std::uint64_t offset) {
+  for (; bytes.size() >= kMarkBytes; bytes.remove_prefix(1)) {
+    if (GetWord<std::uint32_t>(bytes.data()) != kMarkWord) continue;
+    std::size_t ignored = 0;
+    if (LookAtFrame(bytes, ignored) == Frame::kMark &&
+        GetWord<std::uint64_t>(bytes.data() + kFrameBytes) > offset) {
+      return true;
+    }
+  }
+  return false;
+}
+
+// Whether these bytes at the end of a last segment without marks, which begin
+// with no whole message, are all that is left of one: at most zeros are behind
+// it (a power cut that spared the file's size), and no whole message in it (a
+// size that was damaged).
 bool IsTornEnd(std::string_view bytes) {
   // npos + 1 is 0.
   const std::size_t used = bytes.find_last_not_of('\0') + 1;
@@ -264,7 +311,9 @@ absl::Status Spool::OpenSegments() {
     const bool last = i + 1 == paths.size();
     if (last && std::filesystem::file_size(paths[i], error) < kHeaderBytes) {
       // Its making was cut short; nothing was taken into it.
-      std::filesystem::remove(paths[i], error);
+      if (::unlink(paths[i].c_str()) != 0) {
+        return DiskError("remove", paths[i]);
+      }
       continue;
     }
     Segment segment{.path = paths[i]};
@@ -284,22 +333,28 @@ absl::Status Spool::OpenSegments() {
   const std::string& path = segments_.back().path;
   append_ = ::open(path.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
   if (append_ < 0) return DiskError("open", path);
+  if (::ftruncate(append_, static_cast<off_t>(segments_.back().bytes)) != 0) {
+    return DiskError("cut off the torn end of", path);
+  }
   // Who wrote it may have been killed before it synced.
-  FATHOM_RETURN_IF_ERROR(Sync());
+  FATHOM_RETURN_IF_ERROR(NoteSync(segments_.back(), ::fdatasync(append_) == 0));
   return SyncFolder(options_.folder);
 }
 
 absl::Status Spool::Scan(Segment& segment, bool last) {
-  const int file = ::open(segment.path.c_str(), O_RDWR | O_CLOEXEC);
+  const int file = ::open(segment.path.c_str(), O_RDONLY | O_CLOEXEC);
   if (file < 0) return DiskError("open", segment.path);
   std::string bytes;
-  // One byte more than any has shows one that is too large.
-  const bool read = ReadMore(file, 0, kMostSegmentBytes + 1, bytes);
-  absl::Status status =
-      read ? absl::OkStatus() : DiskError("read", segment.path);
-  if (status.ok() && bytes.size() > kMostSegmentBytes) {
+  absl::Status status;
+  struct stat now = {};
+  if (::fstat(file, &now) != 0) {
+    status = DiskError("read", segment.path);
+  } else if (static_cast<std::uint64_t>(now.st_size) > kMostSegmentBytes) {
     status = Damaged(segment.path, kMostSegmentBytes);
+  } else if (!ReadMore(file, 0, static_cast<std::size_t>(now.st_size), bytes)) {
+    status = DiskError("read", segment.path);
   }
+  ::close(file);
   const std::optional<Header> header = DecodeHeader(bytes);
   if (status.ok() && !header.has_value()) status = Damaged(segment.path, 0);
   if (status.ok()) {
@@ -312,28 +367,36 @@ absl::Status Spool::Scan(Segment& segment, bool last) {
     epoch_ = header->epoch;
     segment.first = header->first;
     segment.bytes = kHeaderBytes;
+    segment.has_marks = header->has_marks;
   }
   while (status.ok() && segment.bytes < bytes.size()) {
     std::size_t size = 0;
     const std::string_view rest = std::string_view(bytes).substr(segment.bytes);
-    if (LookAtFrame(rest, size) == Frame::kWhole) {
+    const Frame frame = LookAtFrame(rest, size);
+    if (frame == Frame::kWhole || frame == Frame::kMark) {
+      segment.is_marked =
+          frame == Frame::kMark &&
+          GetWord<std::uint64_t>(rest.data() + kFrameBytes) == segment.bytes;
       segment.bytes += kFrameBytes + size;
-      ++segment.count;
+      segment.count += frame == Frame::kWhole ? 1 : 0;
       continue;
     }
-    if (!last || !IsTornEnd(rest)) {
-      status = Damaged(segment.path, segment.bytes);
-    } else if (::ftruncate(file, static_cast<off_t>(segment.bytes)) != 0) {
-      status = DiskError("cut off the torn end of", segment.path);
-    }
+    const bool torn =
+        last &&
+        (segment.has_marks ? !WasSynced(rest, segment.bytes) : IsTornEnd(rest));
+    if (!torn) status = Damaged(segment.path, segment.bytes);
     break;
   }
-  ::close(file);
   return status;
 }
 
 absl::Status Spool::StartSegment(std::uint64_t first) {
-  if (append_ >= 0) FATHOM_RETURN_IF_ERROR(Sync());
+  FATHOM_RETURN_IF_ERROR(broken_);
+  // Also a mark alone: in a segment that is not the last nothing may be torn,
+  // so none is set after this sync.
+  if (append_ >= 0 && ::fdatasync(append_) != 0) {
+    return NoteSync(segments_.back(), false);
+  }
   Segment segment{.path = absl::StrFormat("%s/%s-%020d.spool", options_.folder,
                                           options_.kind, first),
                   .first = first,
@@ -364,8 +427,8 @@ absl::Status Spool::StartSegment(std::uint64_t first) {
 }
 
 bool Spool::HasRoom(std::size_t message_bytes) const {
-  // A new segment's header too, whether it is needed or not.
-  return bytes_ + kHeaderBytes + kFrameBytes + message_bytes <=
+  // A new segment's header and a mark too, whether they are needed or not.
+  return bytes_ + kHeaderBytes + kFrameBytes + message_bytes + kMarkBytes <=
          options_.max_bytes;
 }
 
@@ -377,13 +440,12 @@ absl::Status Spool::Append(std::string_view message) {
                         options_.folder, bytes_, options_.max_bytes));
   }
   if (segments_.back().count > 0 &&
-      segments_.back().bytes + kFrameBytes + message.size() > segment_bytes_) {
+      segments_.back().bytes + kFrameBytes + message.size() + kMarkBytes >
+          segment_bytes_) {
     FATHOM_RETURN_IF_ERROR(StartSegment(segments_.back().end()));
   }
-  std::string frame(kFrameBytes, '\0');
-  PutWord(static_cast<std::uint32_t>(message.size()), frame.data());
-  PutWord(Crc(message), frame.data() + 4);
-  frame += message;
+  const std::string frame =
+      Framed(static_cast<std::uint32_t>(message.size()), message);
   Segment& segment = segments_.back();
   if (!WriteWhole(append_, frame)) {
     absl::Status status = DiskError("write", segment.path);
@@ -395,6 +457,7 @@ absl::Status Spool::Append(std::string_view message) {
     return status;
   }
   segment.bytes += frame.size();
+  segment.is_marked = false;
   bytes_ += frame.size();
   ++segment.count;
   return absl::OkStatus();
@@ -424,6 +487,10 @@ absl::StatusOr<bool> Spool::Read(std::string& message) {
       ahead_used_ += kFrameBytes + size;
       ++next_read_;
       return true;
+    }
+    if (frame == Frame::kMark) {
+      ahead_used_ += kMarkBytes;
+      continue;
     }
     if (frame == Frame::kDamaged || read_offset_ >= segment->bytes) {
       return Damaged(segment->path, read_offset_ - rest.size());
@@ -455,6 +522,8 @@ absl::Status Spool::Release(std::uint64_t sequence) {
     }
     bytes_ -= segments_.front().bytes;
     segments_.pop_front();
+    // Or a power cut brings back this one without the next.
+    FATHOM_RETURN_IF_ERROR(SyncFolder(options_.folder));
   }
   next_read_ = std::max(next_read_, first_sequence());
   return absl::OkStatus();
@@ -469,12 +538,12 @@ absl::Status Spool::Clear() {
 
 absl::Status Spool::Sync() {
   if (!broken_.ok() || synced_ == last_sequence()) return broken_;
-  return NoteSync(last_sequence(), ::fdatasync(append_) == 0);
+  return NoteSync(segments_.back(), ::fdatasync(append_) == 0);
 }
 
 absl::Status Spool::SyncUnlocked(Mutex& mutex) {
   if (!broken_.ok() || synced_ == last_sequence()) return broken_;
-  const std::uint64_t sequence = last_sequence();
+  const Segment segment = segments_.back();
   // Of our own: an Append may close append_ meanwhile.
   const int file = ::fcntl(append_, F_DUPFD_CLOEXEC, 0);
   mutex.Unlock();
@@ -483,15 +552,30 @@ absl::Status Spool::SyncUnlocked(Mutex& mutex) {
   if (file >= 0) ::close(file);
   mutex.Lock();
   errno = error;
-  return NoteSync(sequence, ok);
+  return NoteSync(segment, ok);
 }
 
-absl::Status Spool::NoteSync(std::uint64_t sequence, bool ok) {
-  if (ok) {
-    synced_ = std::max(synced_, sequence);
-  } else if (broken_.ok()) {
-    broken_ =
-        absl::DataLossError(DiskError("sync", segments_.back().path).message());
+absl::Status Spool::NoteSync(const Segment& synced, bool ok) {
+  if (!ok) {
+    if (broken_.ok()) {
+      broken_ = absl::DataLossError(DiskError("sync", synced.path).message());
+    }
+    return broken_;
+  }
+  synced_ = std::max(synced_, synced.end() - 1);
+  Segment& growing = segments_.back();
+  if (!growing.has_marks || growing.first != synced.first ||
+      synced.count == 0 || synced.is_marked) {
+    return broken_;
+  }
+  // Not synced itself: a process that dies leaves it, a power cut costs at most
+  // that damage of the last messages is taken for its own.
+  if (WriteWhole(append_, EncodeMark(synced.bytes))) {
+    growing.is_marked = synced.bytes == growing.bytes;
+    growing.bytes += kMarkBytes;
+    bytes_ += kMarkBytes;
+  } else if (::ftruncate(append_, static_cast<off_t>(growing.bytes)) != 0) {
+    broken_ = absl::DataLossError(DiskError("write", growing.path).message());
   }
   return broken_;
 }

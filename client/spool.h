@@ -3,14 +3,17 @@
 //
 // A folder holds segments "<kind>-<number of the first message>.spool":
 //
-//   header   "FTHMSPL1", epoch u64, first number u64, source id 64 bytes
+//   header   "FTHMSPL2", epoch u64, first number u64, source id 64 bytes
 //            padded with zeros, CRC-32C of all that u32
 //   message  size u32 (> 0), CRC-32C of the bytes u32, the bytes; again and
-//            again
+//            again, and between them after each sync
+//   mark     2^32 - 1 u32, CRC-32C of the rest u32; how much of the file was
+//            synced, bytes u64
 //
-// all little-endian. A message's number is its place; the last segment alone
-// grows, and a segment goes when the server has all of it. Epoch and numbers
-// outlive the sender: at least one segment stays.
+// all little-endian. "FTHMSPL1" is read too; it has no marks. A message's
+// number is its place; the last segment alone grows, and a segment goes when
+// the server has all of it. Epoch and numbers outlive the sender: at least one
+// segment stays.
 //
 // What survives: every message that Append took outlives the death of the
 // process; a power cut spares the messages up to synced_sequence(). A cut
@@ -18,9 +21,11 @@
 // server takes the new message for the old one. Append syncs a whole segment,
 // Open what it finds.
 //
-// A message torn by either is cut off when the spool is opened again: one in
-// the last segment behind which there are at most zeros. All other damage is
-// refused (DATA_LOSS), never skipped.
+// What a power cut left of unsynced messages is cut off when the spool is
+// opened again, from the first that is not whole on: a disk writes them in any
+// order. They are in the last segment, and no mark behind them covers them. All
+// other damage is refused (DATA_LOSS), never skipped. Without marks, only one
+// message behind which there are at most zeros is cut off.
 //
 // Bounded: the segments never hold more than max_bytes together.
 // Cost: one write(2) a message. Thread safety: none.
@@ -117,6 +122,8 @@ class Spool {
     std::uint64_t first = 0;  // Number of its first message.
     std::uint64_t count = 0;
     std::uint64_t bytes = 0;  // Of the file, header included.
+    bool has_marks = true;
+    bool is_marked = false;  // A mark at its end covers all before.
 
     std::uint64_t end() const { return first + count; }
   };
@@ -125,12 +132,14 @@ class Spool {
 
   absl::Status Lock();
   absl::Status OpenSegments();
-  // Counts the messages of a segment; the torn end of the last is cut off.
+  // Counts the messages of a segment; `segment` ends before the torn end of the
+  // last.
   absl::Status Scan(Segment& segment, bool last);
   // Makes an empty segment behind the others the one that grows.
   absl::Status StartSegment(std::uint64_t first);
-  // How a sync of what was there up to `sequence` ended; errno is its error.
-  absl::Status NoteSync(std::uint64_t sequence, bool ok);
+  // How a sync of `synced`, the last segment as it was then, ended; errno is
+  // its error.
+  absl::Status NoteSync(const Segment& synced, bool ok);
 
   const SpoolOptions options_;
   const std::uint64_t segment_bytes_;

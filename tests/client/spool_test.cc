@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
@@ -11,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "absl/strings/str_format.h"
+#include "base/crc32c.h"
 #include "tests/client/failing_sync.h"
 #include "tests/testing/status_matchers.h"
 
@@ -150,26 +153,34 @@ TEST_F(SpoolTest, ATornEndIsCutOffAndTheRestIsThere) {
   EXPECT_EQ(Segments().size(), 1u);
 }
 
-TEST_F(SpoolTest, DamageBeforeTheLastMessageIsNoTornEnd) {
+TEST_F(SpoolTest, DamageOfWhatWasSyncedIsNoTornEnd) {
   {
     FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
     for (const char* text : {"first", "second", "third"}) {
       FATHOM_ASSERT_OK(spool->Append(text));
     }
+    FATHOM_ASSERT_OK(spool->Sync());
   }
   const std::string path = Segments().back();
   const auto size = std::filesystem::file_size(path);
   // 92 bytes of header, then 8 before each message: its text, its checksum;
-  // its size made larger than the file, than a message, and none.
-  for (const auto& [at, flip] :
-       {std::pair{92 + 8, 1}, {92 + 4, 1}, {92, 64}, {92 + 3, 64}, {92, 5}}) {
+  // its size made larger than the file, than a message, and none; and the text
+  // of the last, 8 + 5 and 8 + 6 bytes further.
+  for (const auto& [at, flip, frame] : {std::array{92 + 8, 1, 92},
+                                        {92 + 4, 1, 92},
+                                        {92, 64, 92},
+                                        {92 + 3, 64, 92},
+                                        {92, 5, 92},
+                                        {119 + 8, 1, 119}}) {
     std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
     file.seekg(at);
     const int good = file.get();
     file.seekp(at);
     file.put(static_cast<char>(good ^ flip)).flush();
-    EXPECT_THAT(Open(), StatusIs(absl::StatusCode::kDataLoss,
-                                 HasSubstr("damaged at byte 92")))
+    EXPECT_THAT(
+        Open(),
+        StatusIs(absl::StatusCode::kDataLoss,
+                 HasSubstr(absl::StrFormat("damaged at byte %d", frame))))
         << at;
     EXPECT_EQ(std::filesystem::file_size(path), size);
     file.seekp(at);
@@ -177,6 +188,69 @@ TEST_F(SpoolTest, DamageBeforeTheLastMessageIsNoTornEnd) {
   }
   FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
   EXPECT_EQ(ReadAll(*spool).size(), 3u);
+}
+
+// A disk writes what was not synced in any order, page by page.
+TEST_F(SpoolTest, WhatAPowerCutLeftOfUnsyncedMessagesIsCutOff) {
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
+    FATHOM_ASSERT_OK(spool->Append("synced"));
+    FATHOM_ASSERT_OK(spool->Sync());
+    for (const char* text : {"lost", "half", "arrived"}) {
+      FATHOM_ASSERT_OK(spool->Append(text));
+    }
+  }
+  const std::string path = Segments().back();
+  {
+    // Behind 92 bytes of header, 8 + 6 of the first and 16 of the mark: the
+    // second, and the last two bytes of the third.
+    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(122) << std::string(8 + 4, '\0');
+    file.seekp(134 + 8 + 2) << std::string(2, '\0');
+  }
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
+  EXPECT_EQ(spool->last_sequence(), 1u);
+  FATHOM_ASSERT_OK(spool->Append("next"));
+  EXPECT_EQ(ReadAll(*spool), (std::vector<std::string>{"synced", "next"}));
+}
+
+// "FTHMSPL1": as today's, with another first word.
+TEST_F(SpoolTest, AFileWithoutMarksIsReadAndGoesOn) {
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
+    for (const char* text : {"first", "second"}) {
+      FATHOM_ASSERT_OK(spool->Append(text));
+    }
+  }
+  const std::string path = Segments().back();
+  {
+    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+    std::array<char, 92> header;
+    file.read(header.data(), header.size());
+    header[7] = '1';
+    const std::uint32_t crc =
+        Crc32c({reinterpret_cast<const std::uint8_t*>(header.data()), 92 - 4});
+    for (std::size_t i = 0; i < 4; ++i) {
+      header[88 + i] = static_cast<char>(crc >> (8 * i));
+    }
+    file.seekp(0).write(header.data(), header.size());
+  }
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
+    FATHOM_ASSERT_OK(spool->Append("third"));
+    FATHOM_ASSERT_OK(spool->Sync());
+    EXPECT_EQ(ReadAll(*spool),
+              (std::vector<std::string>{"first", "second", "third"}));
+  }
+  // A header, three messages and their frames; no mark.
+  EXPECT_EQ(std::filesystem::file_size(path), 92u + 3 * 8 + 5 + 6 + 5);
+  // Damage before the last message is no torn end there either.
+  {
+    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(92 + 8) << 'F';
+  }
+  EXPECT_THAT(Open(), StatusIs(absl::StatusCode::kDataLoss,
+                               HasSubstr("damaged at byte 92")));
 }
 
 TEST_F(SpoolTest, AFileLargerThanAnyOfOursIsNotRead) {
@@ -210,6 +284,20 @@ TEST_F(SpoolTest, ASyncThatFailedIsNotMendedByTheNext) {
   EXPECT_THAT(spool->Sync(), StatusIs(absl::StatusCode::kDataLoss));
   EXPECT_THAT(spool->Append("b"), StatusIs(absl::StatusCode::kDataLoss));
   EXPECT_EQ(spool->synced_sequence(), 0u);
+}
+
+TEST_F(SpoolTest, ASyncCostsAMarkAndARestartNothing) {
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
+    FATHOM_ASSERT_OK(spool->Append("a"));
+  }
+  // 92 bytes of header, 8 + 1, and 16 for the sync of Open.
+  for (int life = 0; life < 3; ++life) {
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
+    EXPECT_EQ(spool->bytes(), 92u + 9 + 16);
+    FATHOM_ASSERT_OK(spool->Sync());
+    EXPECT_EQ(spool->bytes(), 92u + 9 + 16);
+  }
 }
 
 TEST_F(SpoolTest, MakesItsFolderAndThoseAbove) {

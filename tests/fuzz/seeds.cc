@@ -6,10 +6,12 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <random>
 #include <string>
 #include <vector>
 
+#include "client/spool.h"
 #include "storage/activity_codec.h"
 #include "storage/blob.h"
 #include "storage/contact_codec.h"
@@ -20,6 +22,7 @@
 #include "tests/fuzz/requests.h"
 #include "tests/server/sample_messages.h"
 #include "tests/storage/event_script.h"
+#include "tests/storage/temp_dir.h"
 
 namespace fathom::fuzz {
 namespace {
@@ -119,6 +122,40 @@ void WriteStorageSeeds(Seeds& seeds) {
   seeds.Write("pages", "sealed", 1, edits + 4, 8);
 }
 
+// One file and its successor, with marks and with a torn end.
+void WriteSpoolSeeds(Seeds& seeds) {
+  const storage::TempDir folder;
+  const auto file = [&folder](const char* number) {
+    std::ifstream in(folder.File("pings-0000000000000000000" +
+                                 std::string(number) + ".spool"),
+                     std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(in), {});
+  };
+  auto spool = *client::Spool::Open({.folder = folder.path().string(),
+                                     .kind = "pings",
+                                     .source_id = "uuv-1",
+                                     .max_bytes = client::kLeastSpoolBytes});
+  for (const char* text : {"a", "bb", "ccc"}) {
+    (void)spool->Append(text);
+    (void)spool->Sync();
+  }
+  (void)spool->Append("unsynced");
+  const std::string first = file("1");
+  (void)spool->Release(4);
+  (void)spool->Clear();
+  (void)spool->Append("e");
+  const std::string second = file("5");
+  const auto write = [&seeds](const std::string& name, int flags,
+                              std::size_t first_size, const std::string& both) {
+    const std::string input = {static_cast<char>(first_size & 0xFF),
+                               static_cast<char>(first_size >> 8)};
+    seeds.Write("spool", name, flags, (input + both).data(), 2 + both.size());
+  };
+  write("two", 3, first.size(), first + second);
+  write("one", 7, 0, first);
+  write("torn", 5, 0, first.substr(0, first.size() - 3));
+}
+
 v1::Trajectory SampleTrajectory() {
   v1::Trajectory trajectory;
   for (int i = 0; i < 3; ++i) {
@@ -193,5 +230,6 @@ int main(int argc, char** argv) {
   fathom::fuzz::Seeds seeds(argv[1]);
   fathom::fuzz::WriteStorageSeeds(seeds);
   fathom::fuzz::WriteRequestSeeds(seeds);
+  fathom::fuzz::WriteSpoolSeeds(seeds);
   return 0;
 }
