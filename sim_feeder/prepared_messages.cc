@@ -1,7 +1,5 @@
 #include "sim_feeder/prepared_messages.h"
 
-#include <utility>
-
 namespace fathom::feeder {
 
 PreparedMessages::PreparedMessages(Simulation& simulation, std::uint64_t bytes)
@@ -22,19 +20,18 @@ PreparedMessages::PreparedMessages(Simulation& simulation, std::uint64_t bytes)
 }
 
 std::optional<Simulation::Message> PreparedMessages::Next() {
-  if (made_.empty()) {
+  if (given_ == made_.size()) {
     const std::optional<Simulation::Message> message = simulation_.Next();
     now_s_ = simulation_.now_s();
     pings_done_ = simulation_.pings_done();
     return message;
   }
-  given_ = std::move(made_.front());
-  made_.pop_front();
-  now_s_ = given_->at_s;
-  pings_done_ = given_->pings_done;
+  Made& made = made_[given_++];
+  now_s_ = made.at_s;
+  pings_done_ = made.pings_done;
   return std::visit(
       [](auto& message) -> Simulation::Message { return &message; },
-      given_->message);
+      made.message);
 }
 
 }  // namespace fathom::feeder

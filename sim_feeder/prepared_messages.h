@@ -2,11 +2,13 @@
 //
 // A ping costs more to simulate than to send. Who loads a server - flat out, or
 // open loop at a rate near that - makes messages ahead, so that it is the
-// server and the link that are measured. Not thread-safe.
+// server and the link that are measured; nothing of them is freed while it is
+// sent. Not thread-safe.
 
 #ifndef FATHOM_SIM_FEEDER_PREPARED_MESSAGES_H_
 #define FATHOM_SIM_FEEDER_PREPARED_MESSAGES_H_
 
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -22,6 +24,8 @@ class PreparedMessages {
   // Makes messages of `bytes` as they are sent together (in memory about twice
   // that), or all of them. `simulation` must outlive this.
   PreparedMessages(Simulation& simulation, std::uint64_t bytes);
+
+  const Simulation& simulation() const { return simulation_; }
 
   // As Simulation::Next: first what was made ahead, then what is made now.
   std::optional<Simulation::Message> Next();
@@ -40,8 +44,7 @@ class PreparedMessages {
 
   Simulation& simulation_;
   std::deque<Made> made_;
-  // The one that Next gave.
-  std::optional<Made> given_;
+  std::size_t given_ = 0;
   double now_s_ = 0.0;
   std::uint64_t pings_done_ = 0;
 };

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <latch>
 #include <limits>
 #include <map>
 #include <memory>
@@ -20,8 +21,8 @@
 #include "client/proto_time.h"
 #include "sim_feeder/activity.h"
 #include "sim_feeder/angles.h"
-#include "sim_feeder/prepared_messages.h"
 #include "sim_feeder/progress_bar.h"
+#include "sim_feeder/start_line.h"
 
 namespace fathom::feeder {
 namespace {
@@ -192,9 +193,12 @@ ActivityToOpen ActivityOf(const RunOptions& options, const Scenario& scenario) {
           .parameters = options.activity};
 }
 
-// One vehicle's messages into the server or the record files.
+// One vehicle's messages into the server or the record files, from the moment
+// on when all vehicles have their first ones and their streams.
 absl::Status SendSurvey(const RunOptions& options, Simulation& simulation,
-                        SurveyRecord& record) {
+                        std::latch& line, SurveyRecord& record) {
+  StartPlace place(line);
+  PreparedMessages messages(simulation, options.prepare_mib << 20);
   std::ofstream track;
   if (!options.track_out.empty()) {
     track.open(options.track_out, std::ios::trunc);
@@ -211,8 +215,9 @@ absl::Status SendSurvey(const RunOptions& options, Simulation& simulation,
         const std::unique_ptr<RecordSink> sink,
         RecordSink::Open(options.pings_out, options.reports_out,
                          options.link.source_id));
-    return DriveSurvey(simulation, *sink, options.rate, options.show_progress,
-                       track_stream, record, options.prepare_mib << 20);
+    place.WaitForAll();
+    return DriveSurvey(messages, *sink, options.rate, options.show_progress,
+                       track_stream, record);
   }
   FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<client::Client> client,
                           Connect(options.link, !options.link.buffer.empty() &&
@@ -223,9 +228,10 @@ absl::Status SendSurvey(const RunOptions& options, Simulation& simulation,
   }
   FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<MessageSink> sink,
                           OpenSink(*client, options.link, options.rate > 0.0));
-  FATHOM_RETURN_IF_ERROR(DriveSurvey(simulation, *sink, options.rate,
+  place.WaitForAll();
+  FATHOM_RETURN_IF_ERROR(DriveSurvey(messages, *sink, options.rate,
                                      options.show_progress, track_stream,
-                                     record, options.prepare_mib << 20));
+                                     record));
   if (record.reconnects > 0 && options.start_activity) {
     // Acks that a cut swallowed are counted nowhere else.
     FATHOM_ASSIGN_OR_RETURN(const ActivityCounts counts,
@@ -265,10 +271,10 @@ absl::Status ValidateRun(const RunOptions& options) {
 
 }  // namespace
 
-absl::Status DriveSurvey(Simulation& simulation, MessageSink& sink, double rate,
-                         bool show_progress, std::ostream* track,
-                         SurveyRecord& record, std::uint64_t prepare_bytes) {
-  PreparedMessages messages(simulation, prepare_bytes);
+absl::Status DriveSurvey(PreparedMessages& messages, MessageSink& sink,
+                         double rate, bool show_progress, std::ostream* track,
+                         SurveyRecord& record) {
+  const Simulation& simulation = messages.simulation();
   ProgressBar bar(simulation.pings_planned(), "pings", show_progress);
   const SteadyClock::time_point start = SteadyClock::now();
   absl::Status sent;
@@ -336,10 +342,12 @@ absl::StatusOr<std::vector<SurveyRecord>> PerformSurveys(
     }
   }
   std::vector<absl::Status> ends(own.size());
+  std::latch line(std::ssize(own));
   std::vector<std::thread> vehicles;
   for (std::size_t i = 0; i < own.size(); ++i) {
-    vehicles.emplace_back(
-        [&, i] { ends[i] = SendSurvey(own[i], *simulations[i], records[i]); });
+    vehicles.emplace_back([&, i] {
+      ends[i] = SendSurvey(own[i], *simulations[i], line, records[i]);
+    });
   }
   for (std::thread& vehicle : vehicles) vehicle.join();
   if (std::any_of(records.begin(), records.end(),

@@ -13,6 +13,7 @@
 #include "fathom/v1/mission_service.pb.h"
 #include "sim_feeder/link.h"
 #include "sim_feeder/message_sink.h"
+#include "sim_feeder/prepared_messages.h"
 #include "sim_feeder/scenario.h"
 #include "sim_feeder/simulation.h"
 #include "sim_feeder/survey_record.h"
@@ -38,9 +39,8 @@ struct RunOptions {
   // Times real time; 0: flat out.
   double rate = 0.0;
 
-  // So much of the messages, shared by the vehicles, is made before the first
-  // of a vehicle is sent,
-  // MiB (prepared_messages.h); not with track_out.
+  // So much of the messages, shared by the vehicles, is made before any
+  // vehicle sends, MiB (prepared_messages.h); not with track_out.
   std::uint64_t prepare_mib = 0;
 
   // Open the activity first. Its area, cell size and id are the scenario's.
@@ -61,10 +61,11 @@ struct RunOptions {
   bool json = false;
 };
 
-// Runs, and tells people the outcome on standard error: one summary of all
-// vehicles; their records in their order. Errors: of the scenario, the
-// connection and the streams (the first vehicle's that failed);
-// INVALID_ARGUMENT for several vehicles that would write to one file.
+// Runs, all vehicles from the same moment on, and tells people the outcome on
+// standard error: one summary of all vehicles; their records in their order.
+// Errors: of the scenario, the connection and the streams (the first vehicle's
+// that failed); INVALID_ARGUMENT for several vehicles that would write to one
+// file.
 absl::StatusOr<std::vector<SurveyRecord>> PerformSurveys(
     const RunOptions& options, const TruthSource& truth);
 
@@ -74,13 +75,12 @@ absl::StatusOr<std::vector<SurveyRecord>> PerformSurveys(
 // Errors: of the truth, the scenario, the connection and the streams.
 absl::Status RunSurvey(const RunOptions& options);
 
-// The part without network or files: drives `simulation` into `sink` and adds
+// The part without network or files: drives `messages` into `sink` and adds
 // what was sent and acknowledged to `record`. `track` (may be null) gets CSV
-// lines of the vehicle's way, one per ping. The first `prepare_bytes` of
-// messages are made before the clock starts (prepared_messages.h).
-absl::Status DriveSurvey(Simulation& simulation, MessageSink& sink, double rate,
-                         bool show_progress, std::ostream* track,
-                         SurveyRecord& record, std::uint64_t prepare_bytes = 0);
+// lines of the vehicle's way, one per ping; nothing was made ahead then.
+absl::Status DriveSurvey(PreparedMessages& messages, MessageSink& sink,
+                         double rate, bool show_progress, std::ostream* track,
+                         SurveyRecord& record);
 
 }  // namespace fathom::feeder
 

@@ -22,7 +22,8 @@ HEADER_BYTES = 92
 
 def numbers_in(buffer):
     """First and last number of the pings that a buffer holds, read without the
-    feeder: 92 bytes of header, then size, checksum, message."""
+    feeder: 92 bytes of header, then size, checksum, message; a mark is 8 bytes
+    behind 2^32 - 1 and a checksum."""
     segments = sorted(pathlib.Path(buffer).glob("pings-*.spool"))
     first = int(segments[0].stem.removeprefix("pings-"))
     last = first - 1
@@ -31,6 +32,9 @@ def numbers_in(buffer):
         place = HEADER_BYTES
         while place + FRAME.size <= len(data):
             size, _ = FRAME.unpack_from(data, place)
+            if size == 2**32 - 1:
+                place += FRAME.size + 8
+                continue
             place += FRAME.size + size
             last += place <= len(data)
     return first, last
@@ -173,6 +177,20 @@ class Link(LiveTest):
             self.assertEqual(
                 record["measurements_accepted"]
                 + sum(record["rejects"].values()), record["measurements"])
+
+    def test_a_fleet_that_makes_its_messages_first(self):
+        with self.new_mission() as server:
+            words = self.words(server.address, "--vehicles", 3, "--pings", 200,
+                               "--prepare-mib", 3, "--json")
+            done = self.run_feeder(words)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            records = [json.loads(line) for line in done.stdout.splitlines()]
+            self.assertEqual([r["pings_durable"] for r in records], [200] * 3)
+            # All wait for all; those that fail hold up nobody, so that this
+            # ends: the server takes an activity once.
+            done = self.run_feeder(words)
+            self.assertEqual(done.returncode, 1)
+            self.assertIn("feeder-1 (3 of 3 vehicles failed)", done.stderr)
 
     def test_a_server_that_is_away_until_after_the_end(self):
         # A ship too: reports have a buffer of their own.

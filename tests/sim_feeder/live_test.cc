@@ -132,14 +132,14 @@ TEST(LiveServer, MapAgreesWithTheTruthThatItNeverSaw) {
   FATHOM_ASSERT_OK_AND_ASSIGN(
       const std::unique_ptr<StreamSink> sink,
       StreamSink::Open(*client, {.source_id = "feeder"}));
+  PreparedMessages messages(*simulation, 0);
   SurveyRecord record;
   record.source_id = "feeder";
   record.area = scenario.area;
   record.start_time = scenario.start_time;
   record.end_time = simulation->TimeAt(simulation->duration_s());
   record.ships = simulation->ships();
-  FATHOM_ASSERT_OK(
-      DriveSurvey(*simulation, *sink, 0.0, false, nullptr, record));
+  FATHOM_ASSERT_OK(DriveSurvey(messages, *sink, 0.0, false, nullptr, record));
   EXPECT_EQ(record.pings, 1500u);
   EXPECT_EQ(record.pings_durable, 1500u);
   EXPECT_EQ(record.reports_durable, record.contact_reports);

@@ -252,9 +252,10 @@ class CountingSink final : public MessageSink {
 TEST(DriveSurvey, SendsEverythingAndCountsAcksAndRejects) {
   const auto simulation =
       *Simulation::Create(SmallScenario(), MakePlaneSeabed(Rough));
+  PreparedMessages messages(*simulation, 0);
   CountingSink sink;
   SurveyRecord record;
-  FATHOM_ASSERT_OK(DriveSurvey(*simulation, sink, 0.0, false, nullptr, record));
+  FATHOM_ASSERT_OK(DriveSurvey(messages, sink, 0.0, false, nullptr, record));
   EXPECT_TRUE(sink.finished);
   EXPECT_EQ(record.pings, 300u);
   EXPECT_EQ(sink.pings, 300u);
@@ -268,10 +269,11 @@ TEST(DriveSurvey, SendsEverythingAndCountsAcksAndRejects) {
 TEST(DriveSurvey, StopsAtTheStreamsError) {
   const auto simulation =
       *Simulation::Create(SmallScenario(), MakePlaneSeabed(Rough));
+  PreparedMessages messages(*simulation, 0);
   CountingSink sink;
   sink.fail_at = 5;
   SurveyRecord record;
-  EXPECT_THAT(DriveSurvey(*simulation, sink, 0.0, false, nullptr, record),
+  EXPECT_THAT(DriveSurvey(messages, sink, 0.0, false, nullptr, record),
               StatusIs(absl::StatusCode::kUnavailable));
   EXPECT_EQ(sink.pings, 5u);
   EXPECT_EQ(record.pings, 4u);

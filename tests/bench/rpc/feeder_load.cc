@@ -61,8 +61,9 @@ absl::StatusOr<std::unique_ptr<Simulation>> MakeSimulation(
 absl::StatusOr<double> Drive(Simulation& simulation, feeder::MessageSink& sink,
                              std::uint64_t prepare_bytes) {
   feeder::SurveyRecord record;
-  FATHOM_RETURN_IF_ERROR(feeder::DriveSurvey(simulation, sink, 0.0, false,
-                                             nullptr, record, prepare_bytes));
+  feeder::PreparedMessages messages(simulation, prepare_bytes);
+  FATHOM_RETURN_IF_ERROR(
+      feeder::DriveSurvey(messages, sink, 0.0, false, nullptr, record));
   return static_cast<double>(record.pings) / record.seconds;
 }
 
