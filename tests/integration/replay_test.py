@@ -5,8 +5,10 @@ the map is asked at their places. Skipped without ../shared/data.
 """
 
 import csv
+import datetime
 import gzip
 import json
+import math
 import os
 import pathlib
 import random
@@ -141,6 +143,84 @@ class Replay(LiveTest):
             heard = {contact.contact_id for contact in listed.contacts}
             self.assertLessEqual(heard, {f"mmsi:{int(s):09d}" for s in ships})
             self.assertGreaterEqual(len(heard), len(ships) - 1)
+
+    def test_ships_are_where_they_were_foretold(self):
+        """The log in eleven parts; after each the live server foretells one
+        and five minutes ahead what the next parts hold."""
+        path = CONTACTS / "solent-ais" / "SolentAIS_20160112_130211.csv"
+        with open(path, encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        def seconds(row):
+            return datetime.datetime.fromisoformat(
+                row["Time"] + "+00:00").timestamp()
+        parts = 11
+        inside = {60: [0, 0, 0], 300: [0, 0, 0]}
+        asked = {60: 0, 300: 0}
+        with self.server_about(50.8, -1.2, side_nmi=60) as server:
+            for part in range(parts):
+                first = len(rows) * part // parts
+                end = len(rows) * (part + 1) // parts
+                log = self.folder / f"part{part}.csv"
+                with open(log, "w", encoding="utf-8", newline="") as file:
+                    writer = csv.DictWriter(file, rows[0].keys())
+                    writer.writeheader()
+                    writer.writerows(rows[first:end])
+                sent = self.replay(server, log, "--epoch", part + 1)
+                self.assertEqual(sent["reports_durable"], end - first)
+                for ahead_s in inside:
+                    then = seconds(rows[end - 1]) + ahead_s
+                    heard = {f"mmsi:{int(row['MMSI']):09d}": row
+                             for row in rows[end:]
+                             if abs(seconds(row) - then) <= 5}
+                    request = obstacle.ListContactsRequest()
+                    request.time.FromMicroseconds(round(then * 1e6))
+                    for ship in server.obstacle.ListContacts(
+                            request, timeout=DEADLINE_S).contacts:
+                        row = heard.get(ship.contact_id)
+                        if row is None:
+                            continue
+                        square = self.off(ship, row, then - seconds(row))
+                        asked[ahead_s] += 1
+                        for k, share in enumerate((0.5, 0.9, 0.99)):
+                            inside[ahead_s][k] += (
+                                square <= -2 * math.log(1 - share))
+            request = obstacle.ListContactsRequest(include_inactive=True)
+            request.time.FromMicroseconds(round(seconds(rows[-1]) * 1e6))
+            listed = server.obstacle.ListContacts(request,
+                                                  timeout=DEADLINE_S).contacts
+            # Every ship, none of them in the Indian Ocean.
+            self.assertEqual({ship.contact_id for ship in listed},
+                             {f"mmsi:{int(row['MMSI']):09d}" for row in rows})
+            for ship in listed:
+                self.assertLess(abs(ship.position.longitude_deg + 1.2), 1)
+            gated = {reject.reason: reject.count
+                     for reject in server.status().contacts.rejects}
+            self.assertEqual(gated, {types.REJECT_REASON_GATED: 1})
+        for ahead_s, counts in inside.items():
+            percent = [100 * count / asked[ahead_s] for count in counts]
+            print(f"{ahead_s} s ahead: {percent[0]:.0f} / {percent[1]:.0f} / "
+                  f"{percent[2]:.0f} % of {asked[ahead_s]} ships in the "
+                  "ellipses of 50 / 90 / 99 %")
+            self.assertGreater(asked[ahead_s], 100)
+
+    @staticmethod
+    def off(ship, row, since_s):
+        """Squared distance, in sigmas, of a foretold ship from its report,
+        since_s before the time foretold."""
+        course = math.radians(float(row["COG_degrees"]))
+        way_m = float(row["SOG_knots"]) * 1852 / 3600 * since_s
+        latitude = float(row["Latitude_degrees"])
+        north = (ship.position.latitude_deg - latitude) * 111_240 \
+            - way_m * math.cos(course)
+        east = (ship.position.longitude_deg
+                - float(row["Longitude_degrees"])) * 111_320 \
+            * math.cos(math.radians(latitude)) - way_m * math.sin(course)
+        # The report's own noise, 10 m, belongs to the comparison.
+        nn = ship.covariance[0] + 100
+        ne = ship.covariance[1]
+        ee = ship.covariance[4] + 100
+        return ((ee * north * north - 2 * ne * north * east
+                 + nn * east * east) / (nn * ee - ne * ne))
 
     def test_every_other_recording_ends(self):
         with self.server_about(0, 0, side_nmi=1000) as server:
