@@ -69,6 +69,7 @@ absl::Status MapKeeper::CommitItems(std::vector<StorageItem>& items) {
     // Up to and with the next checkpoint, which covers what is before it.
     storage::Batch batch;
     batch.journal.reserve(items.size() - begin);
+    batch.contact_history.reserve(items.size() - begin);
     ViewPtr checkpoint;
     size_t records = 0;
     size_t end = begin;

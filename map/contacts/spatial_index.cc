@@ -40,11 +40,15 @@ std::uint64_t ToCode(const GeodeticPoint& point) {
          Spread(index((point.longitude_deg + 180.0) / 360.0));
 }
 
+// std::hypot guards against overflow, of which nothing here comes near, and is
+// ten times as dear.
+double Length(double a, double b) { return std::sqrt(a * a + b * b); }
+
 // The greatest 1 sigma in any direction of the 2x2 covariance at `first`.
 double GreatestStd(const Eigen::Matrix4d& P, int first) {
   const double mean = 0.5 * (P(first, first) + P(first + 1, first + 1));
   const double half = 0.5 * (P(first, first) - P(first + 1, first + 1));
-  return std::sqrt(mean + std::hypot(half, P(first, first + 1)));
+  return std::sqrt(mean + Length(half, P(first, first + 1)));
 }
 
 // After how many reports the reach into the past is made afresh.
@@ -76,7 +80,7 @@ Reach ReachOf(const ContactPoint& point, const ContactClassTable& classes) {
   const double q = classes[static_cast<std::size_t>(point.contact_class)]
                        .process_noise_m2_s3;
   return {.base_m = point.radius_m + kNearSigmas * GreatestStd(point.P, 0),
-          .speed_m_s = std::hypot(point.x(2), point.x(3)) +
+          .speed_m_s = Length(point.x(2), point.x(3)) +
                        kNearSigmas * GreatestStd(point.P, 2),
           .wander_m_s15 = kNearSigmas * std::sqrt(q / 3.0)};
 }
@@ -88,9 +92,10 @@ Reach ReachOf(const ContactPoint& point, const ContactClassTable& classes) {
 constexpr double kSmoothedReach = 1.7;
 constexpr double kSmoothedDraw = 1.5;
 
-// How far from `point` the contact may be found until `next` came.
-double ReachUntil(const ContactPoint& point, const ContactPoint& next,
-                  const ContactClassTable& classes) {
+// How far from `point`, which reaches as told, the contact may be found until
+// `next` came.
+double ReachUntil(const ContactPoint& point, const Reach& reach,
+                  const ContactPoint& next) {
   const double span_s = ToSeconds(next.time - point.time);
   const double draw_m =
       point.frame_origin == next.frame_origin
@@ -99,8 +104,7 @@ double ReachUntil(const ContactPoint& point, const ContactPoint& next,
           : DistanceM(ToUnitVector(next.Position()),
                       ToUnitVector(point.Position())) +
                 span_s * point.x.tail<2>().norm();
-  return kSmoothedReach * ReachOf(point, classes).After(span_s) +
-         kSmoothedDraw * draw_m;
+  return kSmoothedReach * reach.After(span_s) + kSmoothedDraw * draw_m;
 }
 
 // How far from `place`, the newest, the contact may have been at any time
@@ -114,7 +118,7 @@ double PastAfresh(const TrackHistory& history, const UnitVector& place,
     const ContactPoint& point = history[i];
     double reach_m = 0;
     if (i + 1 < history.size()) {
-      reach_m = ReachUntil(point, history[i + 1], classes);
+      reach_m = ReachUntil(point, ReachOf(point, classes), history[i + 1]);
     }
     if (i == 0) {
       const double back_s = ToSeconds(point.time - point.track_start);
@@ -123,8 +127,7 @@ double PastAfresh(const TrackHistory& history, const UnitVector& place,
     // On one plane the difference will do (1.1: what the plane shortens).
     const double distance_m =
         point.frame_origin == newest.frame_origin
-            ? 1.1 *
-                  std::hypot(point.x(0) - newest.x(0), point.x(1) - newest.x(1))
+            ? 1.1 * Length(point.x(0) - newest.x(0), point.x(1) - newest.x(1))
             : DistanceM(place, ToUnitVector(point.Position()));
     past_m = std::max(past_m, distance_m + reach_m);
   }
@@ -133,11 +136,15 @@ double PastAfresh(const TrackHistory& history, const UnitVector& place,
 
 // The same from the entry before the newest estimate came, at least as wide.
 double PastFrom(const TrackHistory& history, const SpatialEntry& before,
-                const UnitVector& place, const ContactClassTable& classes) {
+                const UnitVector& place) {
   const double moved_m = DistanceM(place, before.bounds.low);
   const ContactPoint& last = history[history.size() - 2];
+  // What ReachOf(last) said, rounded up; of a drop, where it is nowhere, 0.
+  const Reach reach{.base_m = before.bounds.base_m,
+                    .speed_m_s = before.bounds.speed_m_s,
+                    .wander_m_s15 = before.bounds.wander_m_s15};
   return moved_m + std::max(static_cast<double>(before.bounds.past_m),
-                            ReachUntil(last, history.newest(), classes));
+                            ReachUntil(last, reach, history.newest()));
 }
 
 // ToUnitVector in single precision, within 1.6 m: half a unit of a longitude's
@@ -225,7 +232,7 @@ SpatialEntry MakeSpatialEntry(const Contact& contact,
     bounds.wander_m_s15 = Above(reach.wander_m_s15);
   }
   bounds.past_m = Above(before.has_value() && newest.report_count % kAfresh != 0
-                            ? PastFrom(history, *before, bounds.low, classes)
+                            ? PastFrom(history, *before, bounds.low)
                             : PastAfresh(history, bounds.low, classes));
   return entry;
 }

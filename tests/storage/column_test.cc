@@ -66,6 +66,31 @@ TEST(Column, FloatsComeBackBitForBitAtEverySizeAndRoughness) {
   }
 }
 
+TEST(Rows, AreOnePlaneByteByByteAtEveryWidthAndCount) {
+  std::mt19937 random(4);
+  for (const std::size_t width : {3u, 15u, 16u, 17u, 33u, 250u}) {
+    for (const std::size_t count : {1u, 2u, 15u, 16u, 17u, 128u}) {
+      Bytes rows(width * count);
+      for (auto& byte : rows) byte = static_cast<std::uint8_t>(random());
+      ByteWriter writer;
+      PutRows(rows, width, writer);
+      const Bytes written = writer.bytes();
+      // Noise is raw (1): byte k of row i stands at k * count + i.
+      ASSERT_EQ(written.size(), 1 + rows.size());
+      EXPECT_EQ(written[0], 1);
+      for (std::size_t k = 0; k < width; ++k) {
+        for (std::size_t i = 0; i < count; ++i) {
+          ASSERT_EQ(written[1 + k * count + i], rows[i * width + k])
+              << width << " x " << count << ": " << k << ", " << i;
+        }
+      }
+      ByteReader reader(written);
+      EXPECT_EQ(GetRows(reader, count, width), rows);
+      EXPECT_THAT(reader.Finish("rows"), IsOk());
+    }
+  }
+}
+
 TEST(Column, SmoothDepthsShrink) {
   // Depths of a gentle slope, centimetres apart: sign, exponent and upper
   // mantissa are shared, so at least a third must go.
@@ -84,8 +109,9 @@ TEST(Column, DamagedBytesNeverCrashOrGrow) {
   for (auto& e : elements) e = static_cast<float>(random() % 1000) * 0.1f;
   ByteWriter writer;
   PutColumn(elements, writer);
+  const Bytes written = writer.bytes();
   for (int trial = 0; trial < 2000; ++trial) {
-    Bytes bytes = writer.bytes();
+    Bytes bytes = written;
     bytes[random() % bytes.size()] ^=
         static_cast<std::uint8_t>(1 + random() % 255);
     bytes.resize(1 + random() % bytes.size());
