@@ -46,10 +46,12 @@ class BlockDirectory {
 
   // REQUIRES: the index lies in the map. Null: never touched.
   const LocalBlock* Find(BlockIndex index) const {
-    const SuperBlock* super = supers_[SuperOf(index)].get();
-    if (super == nullptr) return nullptr;
-    const BlockNode* node = super->blocks[SlotOf(index)].get();
+    const BlockNode* node = FindNode(index);
     return node == nullptr ? nullptr : &node->block;
+  }
+  const BlockNode* FindNode(BlockIndex index) const {
+    const SuperBlock* super = supers_[SuperOf(index)].get();
+    return super == nullptr ? nullptr : super->blocks[SlotOf(index)].get();
   }
 
   std::uint64_t block_count() const { return block_count_; }

@@ -5,6 +5,7 @@
 #define FATHOM_MAP_LOCAL_LOCAL_GRID_H_
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -82,6 +83,8 @@ struct LocalGrid {
                             (cell.j + 0.5) * options.cell_size_m);
   }
 
+  // No other map of this process has it; never 0.
+  const std::uint64_t id = NextId();
   const LocalMapOptions options;
   const NedFrame frame;
   const std::uint32_t cells_north;
@@ -89,6 +92,12 @@ struct LocalGrid {
   const std::uint32_t blocks_north;
   const std::uint32_t blocks_east;
   const std::uint32_t reach;  // Eq. 4.22; 0: no smoothing.
+
+ private:
+  static std::uint64_t NextId() {
+    static std::atomic<std::uint64_t> last{0};
+    return ++last;
+  }
 };
 
 }  // namespace fathom::map

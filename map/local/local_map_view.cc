@@ -9,6 +9,7 @@
 #include "map/local/adaptive.h"
 #include "map/local/block_directory.h"
 #include "map/local/local_grid.h"
+#include "map/local/reading_cache.h"
 #include "map/local/smoothed_reading.h"
 
 namespace fathom::map {
@@ -108,6 +109,51 @@ MeanVariance FromNervegna(const NervegnaCell& cell) {
   return {.mean_m = cell.mean_m, .variance_m2 = cell.variance_m2};
 }
 
+// The newest epoch among the blocks of a cell and its neighbours.
+// REQUIRES: the cell lies in the grid.
+std::uint64_t NewestEpochAround(const LocalGrid& grid,
+                                const BlockDirectory& directory,
+                                CellIndex cell) {
+  // They lie in the blocks of the four corners, which the border cuts off.
+  const BlockIndex south_west = LocalGrid::BlockOf(
+      {.i = std::max(cell.i - 1, 0), .j = std::max(cell.j - 1, 0)});
+  const BlockIndex north_east = LocalGrid::BlockOf(
+      {.i = std::min(cell.i + 1,
+                     static_cast<std::int32_t>(grid.cells_north) - 1),
+       .j = std::min(cell.j + 1,
+                     static_cast<std::int32_t>(grid.cells_east) - 1)});
+  std::uint64_t newest = 0;
+  for (std::uint32_t row = south_west.row; row <= north_east.row; ++row) {
+    for (std::uint32_t col = south_west.col; col <= north_east.col; ++col) {
+      const BlockNode* const node =
+          directory.FindNode({.row = row, .col = col});
+      if (node != nullptr) newest = std::max(newest, node->epoch);
+    }
+  }
+  return newest;
+}
+
+// What `adaptive` says of a measured cell.
+DepthEstimate ReadByAdaptive(const LocalGrid& grid,
+                             const BlockDirectory& directory, CellIndex cell,
+                             const Place& place) {
+  const ReadingName name = {.map = grid.id,
+                            .epoch = NewestEpochAround(grid, directory, cell),
+                            .cell = cell};
+  ReadingCache::Place& kept = ReadingCache::OfThisThread().At(name);
+  if (kept.name == name) return kept.estimate;
+  const double cell_size_m = grid.options.cell_size_m;
+  const Evidence evidence = place.block->evidence.All(place.k);
+  const CellPrior prior = place.block->prior(place.k);
+  Merged merged;
+  kept.estimate = FromAdaptive(
+      ReadAdaptive(evidence, Around(grid, directory, cell, merged), prior,
+                   cell_size_m),
+      evidence, place.block->PendingAt(place.k), prior.hazard_m, cell_size_m);
+  kept.name = name;
+  return kept.estimate;
+}
+
 // The reading of a measured cell. REQUIRES: the cell lies in the grid.
 std::optional<DepthEstimate> ReadMeasured(const LocalGrid& grid,
                                           const BlockDirectory& directory,
@@ -128,16 +174,8 @@ std::optional<DepthEstimate> ReadMeasured(const LocalGrid& grid,
       evidence = place.block->evidence.All(place.k);
       read = ReadKalman(evidence, place.block->prior(place.k));
       break;
-    case EstimatorKind::kAdaptive: {
-      evidence = place.block->evidence.All(place.k);
-      const CellPrior prior = place.block->prior(place.k);
-      Merged merged;
-      return FromAdaptive(
-          ReadAdaptive(evidence, Around(grid, directory, cell, merged), prior,
-                       cell_size_m),
-          evidence, place.block->PendingAt(place.k), prior.hazard_m,
-          cell_size_m);
-    }
+    case EstimatorKind::kAdaptive:
+      return ReadByAdaptive(grid, directory, cell, place);
   }
   return ToEstimate(read, EvidenceKind::kMeasured, evidence, cell_size_m);
 }
