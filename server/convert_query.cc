@@ -1,6 +1,8 @@
 #include "server/convert_query.h"
 
+#include <atomic>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <optional>
 
@@ -10,6 +12,7 @@
 #include "server/errors.h"
 #include "server/field_checks.h"
 #include "server/limits.h"
+#include "server/pieces.h"
 
 namespace fathom::server {
 namespace {
@@ -71,9 +74,9 @@ absl::Status CheckLength(int count, int expected, const FieldPath& path) {
                                       count, expected));
 }
 
-// Points between two looks whether they are still wanted: 0.2 ms, or 5 where
-// each is near a hundred contacts.
-constexpr int kPointsPerLook = 512;
+// Points that a thread answers at once, between two looks whether they are
+// still wanted: 50 us, or 1 ms where each is near a hundred contacts.
+constexpr size_t kPointsPerPiece = 128;
 
 // Lengths and every point's numbers; `time` is the base time.
 absl::Status CheckPoints(const v1::QueryObstaclesRequest& request,
@@ -216,38 +219,48 @@ absl::Status CheckBatch(const v1::QueryObstaclesRequest& request) {
 absl::Status AnswerBatch(const v1::QueryObstaclesRequest& request, Time now,
                          const map::ObstacleMapView& view,
                          v1::QueryObstaclesResponse* out,
-                         absl::FunctionRef<bool()> unwanted) {
+                         absl::FunctionRef<bool()> unwanted, Workers* helpers) {
   const FieldPath root;
-  map::ObstacleQuery query;
+  map::ObstacleQuery shared;
   double water_level_m = 0;
   FATHOM_RETURN_IF_ERROR(
-      ConvertShared(request, now, root, query, water_level_m));
+      ConvertShared(request, now, root, shared, water_level_m));
   FATHOM_RETURN_IF_ERROR(CheckPoints(request, water_level_m, root));
-  const Time base = query.time;
   const int count = request.latitude_deg_size();
   const bool timed = request.time_offset_us_size() != 0;
-  out->mutable_probability()->Reserve(count);
-  out->mutable_state()->Reserve(count);
-  if (request.with_reasons()) {
+  const bool with_reasons = request.with_reasons();
+  out->mutable_probability()->Resize(count, 0.0f);
+  out->mutable_state()->Resize(count, v1::OBSTACLE_STATE_UNSPECIFIED);
+  if (with_reasons) {
     out->mutable_mean_depth_m()->Reserve(count);
     out->mutable_std_m()->Reserve(count);
     out->mutable_age_s()->Reserve(count);
     out->mutable_kind()->Reserve(count);
   }
-  for (int i = 0; i < count; ++i) {
-    if (i % kPointsPerLook == 0 && i > 0 && unwanted()) {
-      return absl::CancelledError("the client has gone");
+  float* const probabilities = out->mutable_probability()->mutable_data();
+  int* const states = out->mutable_state()->mutable_data();
+  std::atomic<bool> dropped = false;
+  const auto answer_piece = [&](size_t begin, size_t end) {
+    if (begin > 0 && !dropped && unwanted()) dropped = true;
+    if (dropped) return;
+    map::ObstacleQuery query = shared;
+    for (int i = static_cast<int>(begin); i < static_cast<int>(end); ++i) {
+      query.position = {.latitude_deg = request.latitude_deg(i),
+                        .longitude_deg = request.longitude_deg(i)};
+      query.depth_m = request.depth_m(i) - water_level_m;
+      if (timed) {
+        query.time = shared.time + Duration(request.time_offset_us(i));
+      }
+      const map::ObstacleAnswer answer = view.Answer(query);
+      probabilities[i] = static_cast<float>(answer.probability);
+      states[i] = static_cast<int>(answer.state);
+      if (with_reasons) WriteReasons(answer, i, count, out);
     }
-    query.position = {.latitude_deg = request.latitude_deg(i),
-                      .longitude_deg = request.longitude_deg(i)};
-    query.depth_m = request.depth_m(i) - water_level_m;
-    if (timed) query.time = base + Duration(request.time_offset_us(i));
-    const map::ObstacleAnswer answer = view.Answer(query);
-    out->mutable_probability()->AddAlreadyReserved(
-        static_cast<float>(answer.probability));
-    out->mutable_state()->AddAlreadyReserved(static_cast<int>(answer.state));
-    if (request.with_reasons()) WriteReasons(answer, i, count, out);
-  }
+  };
+  // Reasons are appended, so in order.
+  ForEachPiece(with_reasons ? nullptr : helpers, static_cast<size_t>(count),
+               kPointsPerPiece, answer_piece);
+  if (dropped) return absl::CancelledError("the client has gone");
   WriteStamp(view, out->mutable_stamp());
   return absl::OkStatus();
 }

@@ -13,6 +13,7 @@
 #include "fathom/v1/obstacle_service.pb.h"
 #include "map/obstacle_map/obstacle_map_view.h"
 #include "map/query/obstacle_query.h"
+#include "server/workers.h"
 
 namespace fathom::server {
 
@@ -23,14 +24,16 @@ absl::StatusOr<map::ObstacleQuery> ConvertQuery(
 // One answer.
 void WriteAnswer(const map::ObstacleAnswer& answer, v1::ObstacleAnswer* out);
 
-// Checks the whole batch, then answers every point of it from `view`. On an
+// Checks the whole batch, then answers every point of it from `view`; without
+// reasons also on those of `helpers` that are free. On an
 // error `out` is unspecified. Errors: INVALID_ARGUMENT (field path, with the
 // index of the point), RESOURCE_EXHAUSTED past kMaxPointsPerQuery; CANCELLED
-// soon after `unwanted` is true, which is asked now and then.
+// soon after `unwanted` is true, which is asked now and then, by any thread.
 absl::Status AnswerBatch(
     const v1::QueryObstaclesRequest& request, Time now,
     const map::ObstacleMapView& view, v1::QueryObstaclesResponse* out,
-    absl::FunctionRef<bool()> unwanted = [] { return false; });
+    absl::FunctionRef<bool()> unwanted = [] { return false; },
+    Workers* helpers = nullptr);
 // The checks alone, for a request that has to wait for a revision.
 absl::Status CheckBatch(const v1::QueryObstaclesRequest& request);
 

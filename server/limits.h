@@ -178,6 +178,9 @@ inline constexpr size_t kMaxSearches = 256;
 // Threads for them, apart from the bulk streams': an avoidance loop must not
 // queue behind 64 exports.
 inline constexpr size_t kSearchThreads = 2;
+// Threads that help with a batch of points: most that are started, one fewer
+// than the machine has cores.
+inline constexpr size_t kMaxBatchHelpers = 7;
 // WatchRegion, WatchContacts and WatchTrajectory calls at once: some screens
 // and planners for each of kMaxIngestStreams vehicles. Each holds one message
 // (of a region 6 kB, of contacts 25 kB) and, of a region, one bit for

@@ -165,15 +165,16 @@ grpc::ServerUnaryReactor* ObstacleService::QueryObstacles(
     if (!checked.ok()) return Reply(call, checked);
   }
   grpc::ServerUnaryReactor* reactor = call->DefaultReactor();
-  AtRevision(
-      context_, *call, request->min_revision(),
-      [call, reactor, request, response, now](const absl::Status& status,
-                                              const ViewPtr& view) {
-        reactor->Finish(ToGrpc(
-            status.ok() ? AnswerBatch(*request, now, *view, response,
-                                      [call] { return call->IsCancelled(); })
-                        : status));
-      });
+  AtRevision(context_, *call, request->min_revision(),
+             [this, call, reactor, request, response, now](
+                 const absl::Status& status, const ViewPtr& view) {
+               reactor->Finish(ToGrpc(
+                   status.ok() ? AnswerBatch(
+                                     *request, now, *view, response,
+                                     [call] { return call->IsCancelled(); },
+                                     &context_.batch_helpers)
+                               : status));
+             });
   return reactor;
 }
 

@@ -38,6 +38,8 @@ class Workers {
   Workers(const Workers&) = delete;
   Workers& operator=(const Workers&) = delete;
 
+  size_t size() const { return threads_.size(); }
+
   // Does `job` on one of the threads, begun in the order given (with one
   // thread: one after the other). Not bounded by itself: each call has at most
   // two jobs waiting, and calls are bounded.

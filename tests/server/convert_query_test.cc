@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <functional>
@@ -136,7 +137,31 @@ TEST(AnswerBatch, EndsSoonAfterNobodyWantsIt) {
                 .code(),
             absl::StatusCode::kCancelled);
   EXPECT_EQ(looks, 3);
-  EXPECT_LE(response.probability_size(), 2'000);
+  const auto& states = response.state();
+  EXPECT_LE(states.size() - std::count(states.begin(), states.end(),
+                                       v1::OBSTACLE_STATE_UNSPECIFIED),
+            2'000);
+}
+
+TEST(AnswerBatch, HelpersChangeNoAnswer) {
+  const auto view = SampleMap().View();
+  v1::QueryObstaclesRequest request;
+  request.set_confidence(0.9);
+  for (int i = 0; i < 10'000; ++i) {
+    // Over the chart and beyond it, above the floor and below.
+    request.add_latitude_deg(41.45 + 1e-5 * i);
+    request.add_longitude_deg(-71.395);
+    request.add_depth_m(static_cast<float>(i % 30));
+  }
+  v1::QueryObstaclesResponse alone;
+  FATHOM_ASSERT_OK(AnswerBatch(request, kNow, *view, &alone));
+  Workers helpers(3);
+  for (int round = 0; round < 20; ++round) {
+    v1::QueryObstaclesResponse helped;
+    FATHOM_ASSERT_OK(AnswerBatch(
+        request, kNow, *view, &helped, [] { return false; }, &helpers));
+    ASSERT_EQ(helped.SerializeAsString(), alone.SerializeAsString());
+  }
 }
 
 TEST(AnswerBatch, GivesTheSameAnswersAsOneByOne) {
