@@ -48,7 +48,7 @@ struct ServerContext {
   Workers workers{kWorkerThreads};
   // Trajectories and nearest obstacles.
   Workers searches{kSearchThreads};
-  // Help gRPC's threads with the points of a batch; its own jobs are short.
+  // Help gRPC's threads with the points of a batch.
   Workers batch_helpers{BatchHelpers()};
   // Watches, a thread for each kind: none waits for another kind, and all
   // together leave what other cores there are to the rest. A region's tile

@@ -125,7 +125,9 @@ void BM_UpdateNervegna(benchmark::State& state) {
 BENCHMARK(BM_UpdateNervegna);
 
 // One point by latitude and longitude: projection, look-up, estimate. The
-// argument: 0 scattered over the track's area, 1 along a line (a path).
+// argument: 0 scattered over the track's area, 1 along a line (a path), over
+// and over, so that readings are kept; 2 scattered, in pairs of cells that
+// take each other's place there (map/local/reading_cache.h): none is kept.
 void BM_ReadPoint(benchmark::State& state) {
   const LocalMapOptions options = Scene(EstimatorKind::kAdaptive);
   LocalMap map = MakeMap(options);
@@ -134,12 +136,26 @@ void BM_ReadPoint(benchmark::State& state) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   std::vector<GeodeticPoint> points(4096);
-  for (std::size_t k = 0; k < points.size(); ++k) {
+  for (std::size_t k = 0; k < points.size(); k += 2) {
     const double share = static_cast<double>(k) / 4096.0;
-    points[k] = state.range(0) == 0
-                    ? view.frame().ToGeodetic(250.0 + 450.0 * unit(random),
-                                              430.0 + 140.0 * unit(random))
-                    : view.frame().ToGeodetic(250.0 + 450.0 * share, 480.0);
+    const double north_m = 250.0 + 450.0 * unit(random);
+    const double east_m = 430.0 + 140.0 * unit(random);
+    const NedFrame& frame = view.frame();
+    switch (state.range(0)) {
+      case 0:
+        points[k] = frame.ToGeodetic(north_m, east_m);
+        points[k + 1] = frame.ToGeodetic(950.0 - north_m, east_m);
+        break;
+      case 1:
+        points[k] = frame.ToGeodetic(250.0 + 450.0 * share, 480.0);
+        points[k + 1] = frame.ToGeodetic(250.1 + 450.0 * share, 480.0);
+        break;
+      default: {
+        const double south_m = 250.0 + 0.7 * (north_m - 250.0);
+        points[k] = frame.ToGeodetic(south_m, east_m);
+        points[k + 1] = frame.ToGeodetic(south_m + 128.0, east_m);
+      }
+    }
   }
   std::size_t next = 0;
   for (auto _ : state) {
@@ -147,7 +163,7 @@ void BM_ReadPoint(benchmark::State& state) {
     next = (next + 1) % points.size();
   }
 }
-BENCHMARK(BM_ReadPoint)->Arg(0)->Arg(1);
+BENCHMARK(BM_ReadPoint)->Arg(0)->Arg(1)->Arg(2);
 
 // As BM_ReadPoint, for cells that were never measured, smoothing n = 2.
 void BM_ReadSmoothed(benchmark::State& state) {
