@@ -13,6 +13,7 @@
 #include "client/cli/canvas.h"
 #include "client/cli/colormap.h"
 #include "client/cli/value_scale.h"
+#include "sim_feeder/axes.h"
 #include "sim_feeder/evaluation_report.h"
 #include "sim_feeder/track_picture.h"
 
@@ -26,8 +27,6 @@ using client::cli::Colormap;
 using client::cli::Rectangle;
 using client::cli::ValueScale;
 
-constexpr Color kInk = {0.13, 0.16, 0.2};
-constexpr Color kGrid = {0.85, 0.87, 0.89};
 constexpr Color kBar = {0.42, 0.58, 0.75};
 constexpr Color kLine = {0.93, 0.36, 0.13};
 
@@ -43,32 +42,6 @@ Rectangle PanelFrame(int index) {
           .y = kTop,
           .width = kPanel,
           .height = kPanel};
-}
-
-// Both axes from `low` to `high` with ticks, a frame and words.
-void DrawAxes(Canvas& canvas, const Rectangle& frame, const std::string& title,
-              const std::string& across, const std::string& up,
-              const ValueScale& x, const ValueScale& y) {
-  canvas.Text(title, frame.x, frame.y - 14, {.size = 15, .bold = true});
-  for (const double tick : x.Ticks(6)) {
-    const double at = frame.x + x.Place(tick) * frame.width;
-    canvas.SetColor(kGrid);
-    canvas.Line(at, frame.y, at, frame.y + frame.height, 1);
-    canvas.Text(ValueScale::TickText(tick), at, frame.y + frame.height + 18,
-                {.size = 12, .align = Align::kCenter});
-  }
-  for (const double tick : y.Ticks(6)) {
-    const double at = frame.y + (1 - y.Place(tick)) * frame.height;
-    canvas.SetColor(kGrid);
-    canvas.Line(frame.x, at, frame.x + frame.width, at, 1);
-    canvas.Text(ValueScale::TickText(tick), frame.x - 8, at + 4,
-                {.size = 12, .align = Align::kRight});
-  }
-  canvas.Text(across, frame.x + frame.width / 2, frame.y + frame.height + 40,
-              {.size = 12, .align = Align::kCenter});
-  canvas.Text(up, frame.x, frame.y + frame.height + 58, {.size = 12});
-  canvas.SetColor(kInk);
-  canvas.Stroke(frame, 1);
 }
 
 bool IsKnown(const PlaceAnswer& place) { return place.std_m > 0; }
@@ -90,8 +63,11 @@ void DrawErrors(Canvas& canvas, const SurveyArea& area,
   const double rmse_m =
       known == 0 ? 1 : std::sqrt(square_sum_m2 / static_cast<double>(known));
   const double end_m = std::max(1e-3, 2 * rmse_m);
-  DrawAxes(canvas, frame, "Depth: the map's minus the truth, m", "east, m",
-           "up: north, m", {0, area.east_extent_m, ValueScale::Kind::kLinear},
+  DrawAxes(canvas, frame,
+           {.title = "Depth: the map's minus the truth, m",
+            .across = "east, m",
+            .up = "up: north, m"},
+           {0, area.east_extent_m, ValueScale::Kind::kLinear},
            {0, area.north_extent_m, ValueScale::Kind::kLinear});
   canvas.Hatch(frame);
   const Colormap colors = Colormap::Difference();
@@ -131,8 +107,10 @@ void DrawErrors(Canvas& canvas, const SurveyArea& area,
 void DrawReliability(Canvas& canvas, const DepthEvaluation& depth) {
   const Rectangle frame = PanelFrame(1);
   const ValueScale unit(0, 1, ValueScale::Kind::kLinear);
-  DrawAxes(canvas, frame, "Obstacle answers: what was stated came true",
-           "probability stated", "up: share that came true; bars: answers",
+  DrawAxes(canvas, frame,
+           {.title = "Obstacle answers: what was stated came true",
+            .across = "probability stated",
+            .up = "up: share that came true; bars: answers"},
            unit, unit);
   const ReliabilityScore& score = depth.reliability;
   const double most = static_cast<double>(
@@ -184,9 +162,11 @@ void DrawNormalisedErrors(Canvas& canvas, const DepthEvaluation& depth) {
   const Rectangle frame = PanelFrame(2);
   const ValueScale x(-kEnd, kEnd, ValueScale::Kind::kLinear);
   const ValueScale y(0, top, ValueScale::Kind::kLinear);
-  DrawAxes(canvas, frame, "Errors in stated deviations, and the normal curve",
-           "(map - truth) / stated deviation",
-           "up: density; the outer bars hold all beyond", x, y);
+  DrawAxes(canvas, frame,
+           {.title = "Errors in stated deviations, and the normal curve",
+            .across = "(map - truth) / stated deviation",
+            .up = "up: density; the outer bars hold all beyond"},
+           x, y);
   for (int n = 0; n < kBins; ++n) {
     const double density =
         counts[static_cast<std::size_t>(n)] / std::max(1.0, known) / kBinWidth;

@@ -8,19 +8,17 @@
 #include "absl/strings/str_format.h"
 #include "client/cli/canvas.h"
 #include "client/cli/value_scale.h"
+#include "sim_feeder/axes.h"
 
 namespace fathom::feeder {
 namespace {
 
-using client::cli::Align;
 using client::cli::Canvas;
 using client::cli::Color;
 using client::cli::Rectangle;
 using client::cli::ValueScale;
 
 // Colours that hold for who sees no red or green (Okabe and Ito).
-constexpr Color kInk = {0.13, 0.16, 0.2};
-constexpr Color kGrid = {0.85, 0.87, 0.89};
 constexpr Color kTruth = {0.0, 0.45, 0.7};
 constexpr Color kEstimate = {0.84, 0.37, 0.0};
 constexpr Color kEllipse = {0.0, 0.62, 0.45};
@@ -62,30 +60,9 @@ Plan PlanOf(const ContactEvaluation& contacts) {
       .side_m = std::max({1.2 * (north - south), 1.2 * (east - west), 100.0})};
 }
 
-void DrawAxes(Canvas& canvas, const Plan& plan) {
-  const double half_m = 0.5 * plan.side_m;
-  for (const bool up : {false, true}) {
-    const double middle_m = up ? plan.north_m : plan.east_m;
-    const ValueScale scale(middle_m - half_m, middle_m + half_m,
-                           ValueScale::Kind::kLinear);
-    for (const double tick : scale.Ticks(7)) {
-      canvas.SetColor(kGrid);
-      if (up) {
-        canvas.Line(kFrame.x, plan.Y(tick), kFrame.x + kFrame.width,
-                    plan.Y(tick), 1);
-        canvas.Text(ValueScale::TickText(tick), kFrame.x - 6, plan.Y(tick) + 4,
-                    {.size = 12, .align = Align::kRight});
-      } else {
-        canvas.Line(plan.X(tick), kFrame.y, plan.X(tick),
-                    kFrame.y + kFrame.height, 1);
-        canvas.Text(ValueScale::TickText(tick), plan.X(tick),
-                    kFrame.y + kFrame.height + 18,
-                    {.size = 12, .align = Align::kCenter});
-      }
-    }
-  }
-  canvas.Text("east and north of the area's south-west corner, m", kFrame.x,
-              kFrame.y + kFrame.height + 42, {.size = 12});
+ValueScale ScaleAbout(double middle_m, double side_m) {
+  return {middle_m - 0.5 * side_m, middle_m + 0.5 * side_m,
+          ValueScale::Kind::kLinear};
 }
 
 // x' P^-1 x = 5.991: 95 % of two dimensions.
@@ -159,7 +136,12 @@ absl::Status DrawTracks(const std::string& path, const std::string& title,
                       100.0 * contacts.during.ShareWithin95()),
       kFrame.x, 52, {.size = 13});
   const Plan plan = PlanOf(contacts);
-  DrawAxes(canvas, plan);
+  DrawAxes(canvas, kFrame,
+           {.title = "",
+            .across = "east of the area's south-west corner, m",
+            .up = "up: north of it, m"},
+           ScaleAbout(plan.east_m, plan.side_m),
+           ScaleAbout(plan.north_m, plan.side_m));
   cairo_t* const pen = canvas.cairo();
   cairo_save(pen);
   cairo_rectangle(pen, kFrame.x, kFrame.y, kFrame.width, kFrame.height);

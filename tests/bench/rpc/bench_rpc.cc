@@ -5,7 +5,6 @@
 // rounds' ratios: a machine that slows down slows both sides of a round.
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <chrono>
 #include <functional>
 #include <iostream>
 #include <memory>
@@ -19,12 +18,12 @@
 #include "base/status_macros.h"
 #include "client/client.h"
 #include "tests/bench/rpc/bench_rpc_scene.h"
+#include "tests/bench/rpc/measure.h"
 
 namespace fathom::bench {
 namespace {
 
 using client::Client;
-using SteadyClock = std::chrono::steady_clock;
 
 constexpr int kUnaryCallsPerRound = 1000;
 constexpr int kRateThreads = 4;
@@ -32,17 +31,6 @@ constexpr int kRateCallsPerThread = 2000;
 constexpr int kPlacesAhead = 16;
 constexpr int kBatchPoints = 1000;
 constexpr int kBatchesPerRound = 200;
-
-double SecondsSince(SteadyClock::time_point start) {
-  return std::chrono::duration<double>(SteadyClock::now() - start).count();
-}
-
-double Median(std::vector<double> values) {
-  const auto middle =
-      values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // What one side of one round yields: a duration or a rate.
 using Measure = std::function<absl::StatusOr<double>(const Client&, int round)>;
@@ -240,12 +228,7 @@ int Main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--only", only, "Measure this key alone");
   CLI11_PARSE(app, argc, argv);
-  const absl::Status status = Run(server, null, rounds, pings, only);
-  if (!status.ok()) {
-    std::cerr << "bench_rpc: " << status.ToString() << "\n";
-    return 1;
-  }
-  return 0;
+  return ExitCode("bench_rpc", Run(server, null, rounds, pings, only));
 }
 
 }  // namespace

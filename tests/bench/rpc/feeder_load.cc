@@ -7,8 +7,6 @@
 // default sonar 15 m above them in cells of 1 m, so that almost every beam is a
 // measurement of its own: the dearest pings that the sonar makes.
 #include <CLI/CLI.hpp>
-#include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <iostream>
 #include <memory>
@@ -23,24 +21,13 @@
 #include "sim_feeder/message_sink.h"
 #include "sim_feeder/run_command.h"
 #include "sim_feeder/simulation.h"
+#include "tests/bench/rpc/measure.h"
 #include "tests/sim_feeder/plane_terrain.h"
 
 namespace fathom::bench {
 namespace {
 
 using feeder::Simulation;
-using SteadyClock = std::chrono::steady_clock;
-
-double SecondsSince(SteadyClock::time_point start) {
-  return std::chrono::duration<double>(SteadyClock::now() - start).count();
-}
-
-double Median(std::vector<double> values) {
-  const auto middle =
-      values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 absl::StatusOr<std::unique_ptr<Simulation>> MakeSimulation(
     std::shared_ptr<const feeder::LocalTerrain> seabed, int round, int pings) {
@@ -158,10 +145,7 @@ int Main(int argc, char** argv) {
       ->check(CLI::Range(100, 10'000'000))
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
-  const absl::Status status = Run(null, rounds, pings);
-  if (status.ok()) return 0;
-  std::cerr << "feeder_load: " << status.ToString() << "\n";
-  return 1;
+  return ExitCode("feeder_load", Run(null, rounds, pings));
 }
 
 }  // namespace

@@ -22,7 +22,6 @@
 #include <grpcpp/grpcpp.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <deque>
@@ -41,11 +40,11 @@
 #include "client/client.h"
 #include "fathom/v1/ingest_service.grpc.pb.h"
 #include "tests/bench/rpc/bench_rpc_scene.h"
+#include "tests/bench/rpc/measure.h"
 
 namespace fathom::bench {
 namespace {
 
-using SteadyClock = std::chrono::steady_clock;
 using Seconds = std::chrono::duration<double>;
 
 // Of a window's parts.
@@ -54,19 +53,6 @@ struct Lengths {
   double loaded_s = 5;
 };
 
-double Since(SteadyClock::time_point start) {
-  return Seconds(SteadyClock::now() - start).count();
-}
-
-// The value below which a share of the sample lies; 0 of none.
-double Quantile(std::vector<double>& values, double share) {
-  if (values.empty()) return 0;
-  const auto nth = static_cast<std::ptrdiff_t>(
-      share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + nth, values.end());
-  return values[static_cast<std::size_t>(nth)];
-}
-
 // Latencies of questions for `seconds`, microseconds.
 absl::StatusOr<std::vector<double>> AskFor(const client::Client& server,
                                            double seconds) {
@@ -74,11 +60,11 @@ absl::StatusOr<std::vector<double>> AskFor(const client::Client& server,
   v1::QueryObstacleRequest query;
   std::vector<double> times_us;
   const auto start = SteadyClock::now();
-  while (Since(start) < seconds) {
+  while (SecondsSince(start) < seconds) {
     FillQuery(random, query);
     const auto asked = SteadyClock::now();
     FATHOM_RETURN_IF_ERROR(server.QueryObstacle(query).status());
-    times_us.push_back(Since(asked) * 1e6);
+    times_us.push_back(SecondsSince(asked) * 1e6);
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   return times_us;
@@ -262,7 +248,7 @@ absl::Status AskNull(const client::Client& null,
   PingLoad pings(channel, rate, epoch);
   auto loaded = AskFor(null, lengths.loaded_s);
   pings.Stop();
-  const double lasted_s = Since(start);
+  const double lasted_s = SecondsSince(start);
   FATHOM_RETURN_IF_ERROR(loaded.status());
   window["null_idle_p50_us"] = Quantile(idle, 0.5);
   window["null_idle_p99_us"] = Quantile(idle, 0.99);
@@ -298,7 +284,7 @@ absl::Status Run(const std::string& address, const std::string& null_address,
     SideLoad side(*other, *other, epoch);
     auto loaded = AskFor(*planner, lengths.loaded_s);
     pings.Stop();
-    const double lasted_s = Since(start);
+    const double lasted_s = SecondsSince(start);
     FATHOM_RETURN_IF_ERROR(side.Stop());
     FATHOM_RETURN_IF_ERROR(loaded.status());
     if (!pings.status().ok()) {
@@ -344,12 +330,7 @@ int Main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--windows", windows, "How many")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
-  const absl::Status status = Run(server, null, rate, lengths, windows);
-  if (!status.ok()) {
-    std::cerr << "mixed_load: " << status.ToString() << "\n";
-    return 1;
-  }
-  return 0;
+  return ExitCode("mixed_load", Run(server, null, rate, lengths, windows));
 }
 
 }  // namespace

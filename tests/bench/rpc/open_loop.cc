@@ -15,7 +15,6 @@
 #include <sys/prctl.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstddef>
@@ -36,11 +35,11 @@
 #include "client/client.h"
 #include "fathom/v1/obstacle_service.grpc.pb.h"
 #include "tests/bench/rpc/bench_rpc_scene.h"
+#include "tests/bench/rpc/measure.h"
 
 namespace fathom::bench {
 namespace {
 
-using SteadyClock = std::chrono::steady_clock;
 using SteadyTime = SteadyClock::time_point;
 
 // Enough to keep two cores busy; more lengthens the queue only.
@@ -156,15 +155,6 @@ class Asker {
   std::vector<v1::QueryObstacleRequest> queries_;
 };
 
-double Quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  const auto nth =
-      values.begin() + static_cast<std::ptrdiff_t>(
-                           share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), nth, values.end());
-  return *nth;
-}
-
 // The figures of one server, a value a window.
 class Figures {
  public:
@@ -237,12 +227,7 @@ int Main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   // Wakes when a question is due, not 50 us later.
   prctl(PR_SET_TIMERSLACK, 1UL, 0, 0, 0);
-  const absl::Status status = Run(server, null, windows, seconds);
-  if (!status.ok()) {
-    std::cerr << "open_loop: " << status.ToString() << "\n";
-    return 1;
-  }
-  return 0;
+  return ExitCode("open_loop", Run(server, null, windows, seconds));
 }
 
 }  // namespace

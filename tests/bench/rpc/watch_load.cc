@@ -9,7 +9,6 @@
 //
 // Prints one JSON document. Clients and server share the machine.
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <iostream>
@@ -27,25 +26,17 @@
 #include "client/client.h"
 #include "client/proto_time.h"
 #include "tests/bench/rpc/bench_rpc_scene.h"
+#include "tests/bench/rpc/measure.h"
 
 namespace fathom::bench {
 namespace {
 
 using client::Client;
-using SteadyClock = std::chrono::steady_clock;
 
 constexpr int kContacts = 100;
 
 double Milliseconds(Duration span) {
   return static_cast<double>(span.count()) * 1e-3;
-}
-
-double Quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  const auto nth = static_cast<std::ptrdiff_t>(
-      share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + nth, values.end());
-  return values[static_cast<std::size_t>(nth)];
 }
 
 v1::ContactReport ReportOf(const std::string& contact, double latitude_deg,
@@ -247,12 +238,8 @@ int Main(int argc, char** argv) {
       ->check(CLI::Range(1, 10'000))
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
-  const absl::Status status = Run(server, subscribers, per_s, seconds, alerts);
-  if (!status.ok()) {
-    std::cerr << "watch_load: " << status.ToString() << "\n";
-    return 1;
-  }
-  return 0;
+  return ExitCode("watch_load",
+                  Run(server, subscribers, per_s, seconds, alerts));
 }
 
 }  // namespace
