@@ -249,6 +249,24 @@ absl::StatusOr<ContactEvaluation> EvaluateContacts(const client::Client& client,
   return result;
 }
 
+absl::StatusOr<Evaluation> EvaluateSurvey(const LinkOptions& link,
+                                          const TruthSource& truth,
+                                          const SurveyRecord& survey, Time time,
+                                          std::uint64_t seed,
+                                          std::uint64_t points) {
+  FATHOM_ASSIGN_OR_RETURN(const std::shared_ptr<const LocalTerrain> seabed,
+                          truth.SeabedAbout(survey.area, kEvaluationMarginM));
+  FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<client::Client> client,
+                          Connect(link));
+  Evaluation evaluation;
+  FATHOM_ASSIGN_OR_RETURN(
+      evaluation.depth,
+      EvaluateDepth(*client, *seabed, survey.area, time, seed, points));
+  FATHOM_ASSIGN_OR_RETURN(evaluation.contacts,
+                          EvaluateContacts(*client, survey));
+  return evaluation;
+}
+
 absl::Status Evaluate(const EvaluateOptions& options) {
   if (options.points < 1 || options.points > kMaxPoints) {
     return absl::InvalidArgumentError(absl::StrFormat(
@@ -262,16 +280,11 @@ absl::Status Evaluate(const EvaluateOptions& options) {
   }
   FATHOM_ASSIGN_OR_RETURN(const TruthSource truth,
                           TruthSource::Load(options.truth));
-  FATHOM_ASSIGN_OR_RETURN(const std::shared_ptr<const LocalTerrain> seabed,
-                          truth.SeabedAbout(survey.area, kEvaluationMarginM));
-  FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<client::Client> client,
-                          Connect(options.link));
-  FATHOM_ASSIGN_OR_RETURN(const DepthEvaluation depth,
-                          EvaluateDepth(*client, *seabed, survey.area,
-                                        options.time.value_or(survey.end_time),
-                                        options.seed, options.points));
-  FATHOM_ASSIGN_OR_RETURN(const ContactEvaluation contacts,
-                          EvaluateContacts(*client, survey));
+  FATHOM_ASSIGN_OR_RETURN(const Evaluation judged,
+                          EvaluateSurvey(options.link, truth, survey,
+                                         options.time.value_or(survey.end_time),
+                                         options.seed, options.points));
+  const auto& [depth, contacts] = judged;
   if (!options.out.empty()) {
     FATHOM_RETURN_IF_ERROR(WriteEvaluation(options.out, truth.Describe(),
                                            survey.area, depth, contacts));

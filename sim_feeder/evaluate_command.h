@@ -38,6 +38,9 @@ namespace fathom::feeder {
 // Truth is asked inside the area only: what a seabed needs about it, metres.
 inline constexpr double kEvaluationMarginM = 50.0;
 
+// Places that are asked about unless it is said.
+inline constexpr std::uint64_t kDefaultPoints = 20'000;
+
 struct EvaluateOptions {
   // Server and certificates.
   LinkOptions link;
@@ -48,7 +51,7 @@ struct EvaluateOptions {
   std::optional<Time> time;
   std::uint64_t seed = 1;
   // How many places, 1 to 10 M.
-  std::uint64_t points = 20'000;
+  std::uint64_t points = kDefaultPoints;
   // Not empty: evaluation_files.h into this folder.
   std::string out;
   bool json = false;
@@ -115,6 +118,19 @@ absl::StatusOr<DepthEvaluation> EvaluateDepth(const client::Client& client,
                                               std::uint64_t points);
 absl::StatusOr<ContactEvaluation> EvaluateContacts(const client::Client& client,
                                                    const SurveyRecord& survey);
+
+struct Evaluation {
+  DepthEvaluation depth;
+  ContactEvaluation contacts;
+};
+
+// Both, the depth of the survey's area at `time`. Errors: of the truth, the
+// connection and the queries.
+absl::StatusOr<Evaluation> EvaluateSurvey(const LinkOptions& link,
+                                          const TruthSource& truth,
+                                          const SurveyRecord& survey, Time time,
+                                          std::uint64_t seed,
+                                          std::uint64_t points);
 
 // The whole command. Prints a table, or one line of JSON.
 absl::Status Evaluate(const EvaluateOptions& options);

@@ -308,6 +308,13 @@ CLI::App* AddRun(CLI::App& app, RunOptions& run) {
                     "All vehicles survey the one activity");
   AddVehicleAndSonar(*command, run.scenario);
   command->add_option("--track-out", run.track_out, "Write the track, CSV");
+  command
+      ->add_option("--evaluate", run.evaluate_out,
+                   "Ask the server after the run, compare with the truth, and "
+                   "write figures (JSON), places and tracks (CSV) and pictures "
+                   "of both (PNG) into this folder")
+      ->type_name("FOLDER")
+      ->needs(server);
   AddRecordFiles(*command, run, server);
   command->add_flag("--progress", run.show_progress, "Show a progress bar");
   command->add_flag("--json", run.json, "Print the survey record, one line");

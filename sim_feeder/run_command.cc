@@ -21,6 +21,9 @@
 #include "client/proto_time.h"
 #include "sim_feeder/activity.h"
 #include "sim_feeder/angles.h"
+#include "sim_feeder/evaluate_command.h"
+#include "sim_feeder/evaluation_files.h"
+#include "sim_feeder/evaluation_report.h"
 #include "sim_feeder/progress_bar.h"
 #include "sim_feeder/start_line.h"
 
@@ -261,6 +264,11 @@ absl::Status ValidateRun(const RunOptions& options) {
         "vehicles=%d would write to one file; run them one by one",
         options.vehicles));
   }
+  if (!options.evaluate_out.empty() &&
+      (options.vehicles > 1 || options.link.server.empty())) {
+    return absl::InvalidArgumentError(
+        "a run is evaluated by asking its server, one vehicle's at a time");
+  }
   if (options.prepare_mib > 0 && !options.track_out.empty()) {
     return absl::InvalidArgumentError(
         "a track is written as it is gone, not while messages are made ahead: "
@@ -384,6 +392,16 @@ absl::Status RunSurvey(const RunOptions& options) {
     for (const SurveyRecord& record : records) {
       absl::PrintF("%s\n", ToJson(record));
     }
+  }
+  if (!options.evaluate_out.empty()) {
+    const SurveyRecord& survey = records.front();
+    FATHOM_ASSIGN_OR_RETURN(
+        const Evaluation judged,
+        EvaluateSurvey(options.link, truth, survey, survey.end_time,
+                       survey.seed, kDefaultPoints));
+    absl::FPrintF(stderr, "%s", EvaluationTable(judged.depth, judged.contacts));
+    return WriteEvaluation(options.evaluate_out, truth.Describe(), survey.area,
+                           judged.depth, judged.contacts);
   }
   return absl::OkStatus();
 }

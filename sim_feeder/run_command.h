@@ -57,6 +57,9 @@ struct RunOptions {
   std::string pings_out;
   std::string reports_out;
   std::string track_out;
+  // Not empty: the server is asked after the run and its answers are compared
+  // with the truth, into this folder (evaluation_files.h). One vehicle.
+  std::string evaluate_out;
   bool show_progress = false;
   bool json = false;
 };

@@ -1,13 +1,11 @@
 #include "sim_feeder/scenario_command.h"
 
 #include <cstdio>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <vector>
 
 #include "absl/strings/str_format.h"
 #include "base/status_macros.h"
-#include "client/client.h"
 #include "sim_feeder/evaluate_command.h"
 #include "sim_feeder/evaluation_files.h"
 #include "sim_feeder/evaluation_report.h"
@@ -32,16 +30,11 @@ absl::Status RunScenario(const ScenarioOptions& options) {
   FATHOM_ASSIGN_OR_RETURN(const std::vector<SurveyRecord> surveys,
                           PerformSurveys(run, truth));
   const SurveyRecord& survey = surveys.front();
-  FATHOM_ASSIGN_OR_RETURN(const std::shared_ptr<const LocalTerrain> seabed,
-                          truth.SeabedAbout(survey.area, kEvaluationMarginM));
-  FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<client::Client> client,
-                          Connect(options.link));
   FATHOM_ASSIGN_OR_RETURN(
-      const DepthEvaluation depth,
-      EvaluateDepth(*client, *seabed, survey.area, survey.end_time,
-                    run.scenario.seed, scenario.evaluation_points));
-  FATHOM_ASSIGN_OR_RETURN(const ContactEvaluation contacts,
-                          EvaluateContacts(*client, survey));
+      const Evaluation judged,
+      EvaluateSurvey(options.link, truth, survey, survey.end_time,
+                     run.scenario.seed, scenario.evaluation_points));
+  const auto& [depth, contacts] = judged;
   if (!options.out.empty()) {
     FATHOM_RETURN_IF_ERROR(WriteEvaluation(options.out, scenario.title,
                                            survey.area, depth, contacts));

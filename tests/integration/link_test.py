@@ -178,6 +178,24 @@ class Link(LiveTest):
                 record["measurements_accepted"]
                 + sum(record["rejects"].values()), record["measurements"])
 
+    def test_a_run_that_is_evaluated(self):
+        out = self.folder / "evaluation"
+        with self.new_mission() as server:
+            done = self.run_feeder(self.words(server.address, "--pings", 300,
+                                              "--evaluate", out))
+            self.assertEqual(done.returncode, 0, done.stderr)
+            measured = json.loads(
+                (out / "evaluation.json").read_text())["measured"]
+            self.assertGreater(measured["count"], 100)
+            self.assertLess(measured["rmse_m"], 1)
+            for name in ("places.csv", "evaluation.png"):
+                self.assertTrue((out / name).exists(), name)
+            done = self.run_feeder(self.words(
+                server.address, "--pings", 300, "--evaluate", out,
+                "--vehicles", 2))
+            self.assertEqual(done.returncode, 1)
+            self.assertIn("one vehicle's at a time", done.stderr)
+
     def test_a_fleet_that_makes_its_messages_first(self):
         with self.new_mission() as server:
             words = self.words(server.address, "--vehicles", 3, "--pings", 200,
@@ -191,6 +209,14 @@ class Link(LiveTest):
             done = self.run_feeder(words)
             self.assertEqual(done.returncode, 1)
             self.assertIn("feeder-1 (3 of 3 vehicles failed)", done.stderr)
+
+    def lose(self, server, proxy):
+        """Kills the server once it has pings."""
+        wait_until(lambda: sum(a.measurements_accepted for a in
+                               server.status().activities) > 100,
+                   "the first pings")
+        server.kill()
+        proxy.cut()
 
     def test_a_server_that_is_away_until_after_the_end(self):
         # A ship too: reports have a buffer of their own.
@@ -206,11 +232,7 @@ class Link(LiveTest):
             stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         self.addCleanup(feeder.kill)
         with server:
-            wait_until(lambda: sum(a.measurements_accepted for a in
-                                   server.status().activities) > 100,
-                       "the first pings")
-            server.kill()
-            proxy.cut()
+            self.lose(server, proxy)
             _, words = feeder.communicate(timeout=DEADLINE_S)
         self.assertEqual(feeder.returncode, 1)
         self.assertIn("sent 600 pings", words)
@@ -237,11 +259,7 @@ class Link(LiveTest):
         self.addCleanup(feeder.wait)
         self.addCleanup(feeder.kill)
         with server:
-            wait_until(lambda: sum(a.measurements_accepted for a in
-                                   server.status().activities) > 100,
-                       "the first pings")
-            server.kill()
-            proxy.cut()
+            self.lose(server, proxy)
             there = numbers_in(buffer)[1]
             wait_until(lambda: numbers_in(buffer)[1] > there + 200,
                        "pings while the server is away")

@@ -165,11 +165,19 @@ class Scenarios(LiveTest):
         good = (SCENARIOS / "bad_day.yaml").read_text()
         missing = self.folder / "missing_raster.yaml"
         missing.write_text(good.replace("truth: {", "truth: {raster: no.tif, "))
+        # Two by two cells of nobody knows which system.
+        (self.folder / "plain.asc").write_text(
+            "ncols 2\nnrows 2\nxllcorner 500000\nyllcorner 4560000\n"
+            "cellsize 1000\n-20 -20\n-20 -20\n")
+        no_crs = self.folder / "no_crs.yaml"
+        no_crs.write_text(good.replace("truth: {",
+                                       "truth: {raster: plain.asc, "))
         unknown = self.folder / "unknown.yaml"
         unknown.write_text(good.replace("seed:", "sead:"))
         for arguments, word in (
                 (["/nonexistent.yaml"], "cannot read /nonexistent.yaml"),
                 ([missing], "no.tif"),
+                ([no_crs], "plain.asc has no coordinate system"),
                 ([unknown], "unknown.yaml:5: unknown key sead"),
                 ([SCENARIOS / "bad_day.yaml", "--server", "127.0.0.1:1"],
                  "127.0.0.1:1")):
