@@ -345,14 +345,15 @@ absl::Status Spool::Scan(Segment& segment, bool last) {
   const int file = ::open(segment.path.c_str(), O_RDONLY | O_CLOEXEC);
   if (file < 0) return DiskError("open", segment.path);
   std::string bytes;
-  absl::Status status;
   struct stat now = {};
-  if (::fstat(file, &now) != 0) {
-    status = DiskError("read", segment.path);
-  } else if (static_cast<std::uint64_t>(now.st_size) > kMostSegmentBytes) {
+  bool read = ::fstat(file, &now) == 0;
+  const auto file_bytes = static_cast<std::uint64_t>(now.st_size);
+  const bool too_large = file_bytes > kMostSegmentBytes;
+  if (read && !too_large) read = ReadMore(file, 0, file_bytes, bytes);
+  absl::Status status =
+      read ? absl::OkStatus() : DiskError("read", segment.path);
+  if (status.ok() && too_large) {
     status = Damaged(segment.path, kMostSegmentBytes);
-  } else if (!ReadMore(file, 0, static_cast<std::size_t>(now.st_size), bytes)) {
-    status = DiskError("read", segment.path);
   }
   ::close(file);
   const std::optional<Header> header = DecodeHeader(bytes);
