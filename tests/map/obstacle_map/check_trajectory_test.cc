@@ -393,6 +393,14 @@ TEST(CheckTrajectory, WorkIsBoundedAndCanBeStopped) {
       CheckTrajectory(*map.View(), path, {.most_cells = 10'000});
   EXPECT_EQ(bounded.status().code(), absl::StatusCode::kResourceExhausted);
   EXPECT_THAT(std::string(bounded.status().message()), HasSubstr("10000"));
+  // At the limit, and one past it.
+  EXPECT_TRUE(
+      CheckTrajectory(*map.View(), path, {.most_cells = verdict.cells}).ok());
+  EXPECT_EQ(
+      CheckTrajectory(*map.View(), path, {.most_cells = verdict.cells - 1})
+          .status()
+          .code(),
+      absl::StatusCode::kResourceExhausted);
   const std::atomic<bool> stop = true;
   EXPECT_EQ(CheckTrajectory(*map.View(), path, {.stop = &stop}).status().code(),
             absl::StatusCode::kCancelled);
