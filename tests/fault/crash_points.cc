@@ -9,21 +9,13 @@
 //
 // --synchronous-off is the negative control: SQLite then never syncs, and the
 // same test must find missions that went back.
-//
-// Exit code: 0 nothing bad, 1 something bad, 2 misuse or a failure of the test
-// itself.
 
 #include <sqlite3.h>
 
-#include <CLI/CLI.hpp>
-#include <chrono>
-#include <cstdio>
 #include <fstream>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <random>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -32,6 +24,7 @@
 #include "storage/mission_file.h"
 #include "storage/restore.h"
 #include "tests/fault/crash_image.h"
+#include "tests/fault/crash_run.h"
 #include "tests/fault/expected_state.h"
 #include "tests/fault/fault_disk.h"
 #include "tests/storage/event_script.h"
@@ -177,50 +170,24 @@ class Checker {
   std::uint64_t found_revision_ = 0;
 };
 
-struct Result {
-  std::uint64_t points = 0;
-  std::uint64_t operations = 0;
-  std::uint64_t commits = 0;
-  std::uint64_t recoveries_cut = 0;
-  std::uint64_t bad = 0;
-  std::vector<std::string> examples = {};
-};
-
-constexpr std::size_t kMaxExamples = 10;
-
 void CheckWorkload(const Workload& work, std::uint64_t seed,
-                   std::uint64_t wanted_points, Result& result) {
-  CrashImage image(work.start);
+                   CrashTally& tally) {
   Checker checker(seed + 1);
-  std::mt19937_64 random(seed + 2);
   std::size_t commit = 0;  // The first that had not ended.
-  for (std::size_t n = 0; n <= work.log.size(); ++n) {
-    if (n > 0) image.Apply(work.log[n - 1]);
-    while (commit < work.commits.size() && work.commits[commit].end <= n) {
-      ++commit;
-    }
-    const bool under_way =
-        commit < work.commits.size() && work.commits[commit].begin < n;
-    const ExpectedState& before = work.states[commit];
-    const ExpectedState& after = work.states[commit + (under_way ? 1 : 0)];
-    std::set<FileSet> seen;
-    for (int mode = 0; mode < kCrashModes; ++mode) {
-      const FileSet files = image.After(static_cast<CrashMode>(mode), random);
-      if (!seen.insert(files).second) continue;
-      ++result.points;
-      const std::string problem = checker.Check(files, before, after);
-      if (!problem.empty() && ++result.bad <= kMaxExamples) {
-        result.examples.push_back(
-            absl::StrFormat("seed %d, after operation %d of %d, mode %d: %s",
-                            seed, n, work.log.size(), mode, problem));
-      }
-      if (result.points >= wanted_points) break;
-    }
-    if (result.points >= wanted_points) break;
-  }
-  result.operations += work.log.size();
-  result.commits += work.commits.size();
-  result.recoveries_cut += checker.recoveries_cut();
+  CutEverywhere(
+      CrashImage(work.start), work.log, seed,
+      [&](std::size_t n, const FileSet& files) {
+        while (commit < work.commits.size() && work.commits[commit].end <= n) {
+          ++commit;
+        }
+        const bool under_way =
+            commit < work.commits.size() && work.commits[commit].begin < n;
+        return checker.Check(files, work.states[commit],
+                             work.states[commit + (under_way ? 1 : 0)]);
+      },
+      tally);
+  tally.units += work.commits.size();
+  tally.recoveries_cut += checker.recoveries_cut();
 }
 
 // Whatever the code asks for, nothing is ever synced.
@@ -238,52 +205,25 @@ int NeverSync(sqlite3* database, char**, const sqlite3_api_routines*) {
       nullptr);
 }
 
-int Main(int argc, char** argv) {
-  CLI::App app("Power cuts after every disk operation of a mission file");
-  std::uint64_t points = 20'000;
-  std::uint64_t seed = 1;
-  bool synchronous_off = false;
-  std::string out;
-  app.add_option("--points", points, "Crash points to check");
-  app.add_option("--seed", seed, "Of the workload and the cuts");
-  app.add_flag("--synchronous-off", synchronous_off, "The negative control");
-  app.add_option("--out", out, "Result as JSON")->type_name("FILE");
-  CLI11_PARSE(app, argc, argv);
-
-  FaultDisk::Get();
-  const auto start = std::chrono::steady_clock::now();
-  const auto seconds = [&] {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() -
-                                         start)
-        .count();
-  };
-  Result result;
-  for (std::uint64_t round = seed; result.points < points; round += 1000) {
-    auto* const entry = reinterpret_cast<void (*)()>(&NeverSync);
-    if (synchronous_off) sqlite3_auto_extension(entry);
-    const Workload work = RunWorkload(round, 60);
-    if (synchronous_off) sqlite3_cancel_auto_extension(entry);
-    CheckWorkload(work, round, points, result);
-    absl::FPrintF(stderr, "crash points %d of %d, %d bad, %.0f s\n",
-                  result.points, points, result.bad, seconds());
-  }
-  for (const std::string& example : result.examples) {
-    absl::FPrintF(stderr, "bad: %s\n", example);
-  }
-  const nlohmann::ordered_json document = {
-      {"test", synchronous_off ? "crash_points_control" : "crash_points"},
-      {"seed", seed},
-      {"points", result.points},
-      {"bad", result.bad},
-      {"operations", result.operations},
-      {"commits", result.commits},
-      {"recoveries_cut", result.recoveries_cut},
-      {"seconds", seconds()}};
-  if (!out.empty()) std::ofstream(out) << document.dump(2) << "\n";
-  return result.bad == 0 ? 0 : 1;
+void Round(std::uint64_t seed, bool synchronous_off, CrashTally& tally) {
+  auto* const entry = reinterpret_cast<void (*)()>(&NeverSync);
+  if (synchronous_off) sqlite3_auto_extension(entry);
+  const Workload work = RunWorkload(seed, 60);
+  if (synchronous_off) sqlite3_cancel_auto_extension(entry);
+  CheckWorkload(work, seed, tally);
 }
 
 }  // namespace
 }  // namespace fathom::fault
 
-int main(int argc, char** argv) { return fathom::fault::Main(argc, argv); }
+int main(int argc, char** argv) {
+  using namespace fathom::fault;
+  FaultDisk::Get();
+  return CrashPointsMain(
+      argc, argv,
+      {.what = "Power cuts after every disk operation of a mission file",
+       .name = "crash_points",
+       .unit = "commits",
+       .control_flag = "--synchronous-off",
+       .round = Round});
+}

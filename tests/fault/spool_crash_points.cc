@@ -9,26 +9,19 @@
 //
 // --no-sync is the negative control: no sync reaches the disk, and the same
 // test must find messages that are gone.
-//
-// Exit code: 0 nothing bad, 1 something bad, 2 misuse or a failure of the test
-// itself.
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
-#include <chrono>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <random>
-#include <set>
 #include <string>
 #include <vector>
 
 #include "absl/strings/str_format.h"
 #include "client/spool.h"
 #include "tests/fault/crash_image.h"
+#include "tests/fault/crash_run.h"
 #include "tests/fault/file_log.h"
 #include "tests/storage/temp_dir.h"
 
@@ -214,85 +207,33 @@ class Checker {
   std::uint64_t recoveries_cut_ = 0;
 };
 
-struct Result {
-  std::uint64_t points = 0;
-  std::uint64_t operations = 0;
-  std::uint64_t messages = 0;
-  std::uint64_t recoveries_cut = 0;
-  std::uint64_t bad = 0;
-  std::vector<std::string> examples = {};
-};
-
-constexpr std::size_t kMaxExamples = 10;
-
-void CheckWorkload(const Workload& work, std::uint64_t seed,
-                   std::uint64_t wanted_points, Result& result) {
-  CrashImage image({});
+void Round(std::uint64_t seed, bool no_sync, CrashTally& tally) {
+  const Workload work = RunWorkload(seed, 120, no_sync);
   Checker checker(work, seed + 1);
-  std::mt19937_64 random(seed + 2);
   std::size_t at = 0;
-  for (std::size_t n = 0; n <= work.log.size(); ++n) {
-    if (n > 0) image.Apply(work.log[n - 1]);
-    while (at + 1 < work.known.size() && work.known[at + 1].operation <= n) {
-      ++at;
-    }
-    std::set<FileSet> seen;
-    for (int mode = 0; mode < kCrashModes; ++mode) {
-      if (result.points >= wanted_points) break;
-      const FileSet files = image.After(static_cast<CrashMode>(mode), random);
-      if (!seen.insert(files).second) continue;
-      ++result.points;
-      const std::string problem = checker.Check(files, work.known[at]);
-      if (!problem.empty() && ++result.bad <= kMaxExamples) {
-        result.examples.push_back(
-            absl::StrFormat("seed %d, after operation %d of %d, mode %d: %s",
-                            seed, n, work.log.size(), mode, problem));
-      }
-    }
-  }
-  result.operations += work.log.size();
-  result.messages += work.messages.size();
-  result.recoveries_cut += checker.recoveries_cut();
-}
-
-int Main(int argc, char** argv) {
-  CLI::App app("Power cuts after every disk operation of a sender's buffer");
-  std::uint64_t points = 20'000;
-  std::uint64_t seed = 1;
-  bool no_sync = false;
-  std::string out;
-  app.add_option("--points", points, "Crash points to check");
-  app.add_option("--seed", seed, "Of the workload and the cuts");
-  app.add_flag("--no-sync", no_sync, "The negative control");
-  app.add_option("--out", out, "Result as JSON")->type_name("FILE");
-  CLI11_PARSE(app, argc, argv);
-
-  const auto start = std::chrono::steady_clock::now();
-  Result result;
-  for (std::uint64_t round = seed; result.points < points; round += 1000) {
-    const Workload work = RunWorkload(round, 120, no_sync);
-    CheckWorkload(work, round, points, result);
-  }
-  for (const std::string& example : result.examples) {
-    absl::FPrintF(stderr, "bad: %s\n", example);
-  }
-  const nlohmann::ordered_json document = {
-      {"test", no_sync ? "spool_crash_points_control" : "spool_crash_points"},
-      {"seed", seed},
-      {"points", result.points},
-      {"bad", result.bad},
-      {"operations", result.operations},
-      {"messages", result.messages},
-      {"recoveries_cut", result.recoveries_cut},
-      {"seconds",
-       std::chrono::duration<double>(std::chrono::steady_clock::now() - start)
-           .count()}};
-  absl::FPrintF(stderr, "%s\n", document.dump());
-  if (!out.empty()) std::ofstream(out) << document.dump(2) << "\n";
-  return result.bad == 0 ? 0 : 1;
+  CutEverywhere(
+      CrashImage({}), work.log, seed,
+      [&](std::size_t n, const FileSet& files) {
+        while (at + 1 < work.known.size() &&
+               work.known[at + 1].operation <= n) {
+          ++at;
+        }
+        return checker.Check(files, work.known[at]);
+      },
+      tally);
+  tally.units += work.messages.size();
+  tally.recoveries_cut += checker.recoveries_cut();
 }
 
 }  // namespace
 }  // namespace fathom::fault
 
-int main(int argc, char** argv) { return fathom::fault::Main(argc, argv); }
+int main(int argc, char** argv) {
+  return fathom::fault::CrashPointsMain(
+      argc, argv,
+      {.what = "Power cuts after every disk operation of a sender's buffer",
+       .name = "spool_crash_points",
+       .unit = "messages",
+       .control_flag = "--no-sync",
+       .round = fathom::fault::Round});
+}
