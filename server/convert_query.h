@@ -28,7 +28,8 @@ void WriteAnswer(const map::ObstacleAnswer& answer, v1::ObstacleAnswer* out);
 // reasons also on those of `helpers` that are free. On an
 // error `out` is unspecified. Errors: INVALID_ARGUMENT (field path, with the
 // index of the point), RESOURCE_EXHAUSTED past kMaxPointsPerQuery; CANCELLED
-// soon after `unwanted` is true, which is asked now and then, by any thread.
+// soon after `unwanted` is true, which is asked now and then, by several
+// threads at once.
 absl::Status AnswerBatch(
     const v1::QueryObstaclesRequest& request, Time now,
     const map::ObstacleMapView& view, v1::QueryObstaclesResponse* out,

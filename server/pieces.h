@@ -7,9 +7,9 @@
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
-#include <functional>
 #include <memory>
 
+#include "absl/cleanup/cleanup.h"
 #include "absl/functional/function_ref.h"
 #include "base/mutex.h"
 #include "server/workers.h"
@@ -34,34 +34,44 @@ inline void ForEachPiece(
         work(begin, std::min(begin + piece, count));
       }
     }
+    // Whether the loop goes on; if so, Leave() must follow.
+    bool Enter() {
+      MutexLock lock(mutex);
+      if (closed) return false;
+      ++busy;
+      return true;
+    }
+    void Leave() {
+      MutexLock lock(mutex);
+      --busy;
+      changed.NotifyAll();
+    }
+    void Close() {
+      MutexLock lock(mutex);
+      closed = true;
+      while (busy > 0) changed.Wait(mutex);
+    }
     std::atomic<std::size_t> next{0};
     Mutex mutex;
     CondVar changed;
-    // What a helper refers to lives until closed and no longer.
     bool closed FATHOM_GUARDED_BY(mutex) = false;
     int busy FATHOM_GUARDED_BY(mutex) = 0;
   };
   const auto loop = std::make_shared<Loop>();
+  // What `work` refers to lives as long as this call, whichever way it ends.
+  const absl::Cleanup close = [&loop] { loop->Close(); };
   if (helpers != nullptr && count > piece) {
     const std::size_t others = (count - 1) / piece;
     for (std::size_t n = 0; n < std::min(others, helpers->size()); ++n) {
-      helpers->Give([loop, work, count, piece] {
-        {
-          MutexLock lock(loop->mutex);
-          if (loop->closed) return;
-          ++loop->busy;
-        }
+      const bool offered = helpers->Offer([loop, work, count, piece] {
+        if (!loop->Enter()) return;
         loop->Run(work, count, piece);
-        MutexLock lock(loop->mutex);
-        --loop->busy;
-        loop->changed.NotifyAll();
+        loop->Leave();
       });
+      if (!offered) break;
     }
   }
   loop->Run(work, count, piece);
-  MutexLock lock(loop->mutex);
-  loop->closed = true;
-  while (loop->busy > 0) loop->changed.Wait(loop->mutex);
 }
 
 }  // namespace fathom::server

@@ -48,6 +48,15 @@ class Workers {
     jobs_.push_back(std::move(job));
     changed_.NotifyOne();
   }
+  // The same where fewer jobs wait than there are threads; else false: nobody
+  // would come soon.
+  bool Offer(std::function<void()> job) {
+    MutexLock lock(mutex_);
+    if (jobs_.size() >= threads_.size()) return false;
+    jobs_.push_back(std::move(job));
+    changed_.NotifyOne();
+    return true;
+  }
 
  private:
   void Run() {

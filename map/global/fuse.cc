@@ -15,11 +15,14 @@ constexpr double kChanceSigmas = 2.0;
 // A little less than kFreeSigmas, so that a rounded std does not matter.
 constexpr double kNotFreeSigmas = 1.6;
 
-// The depth from which downward an answer from this alone is not FREE.
+// The depth from which downward an answer from this alone is not FREE; at the
+// least what a leaf may hold, far above every vehicle.
 float NotFreeFrom(const CellEvidence& part) {
-  return static_cast<float>(
-      part.mean_m -
-      kFreeSigmas * std::sqrt(part.variance_m2 + part.variability_m2));
+  return std::max(
+      kMinChartDepthM,
+      static_cast<float>(
+          part.mean_m -
+          kFreeSigmas * std::sqrt(part.variance_m2 + part.variability_m2)));
 }
 
 // Where the hazard of the shoalest of n parts begins; kNoHazard if the joined

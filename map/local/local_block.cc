@@ -21,8 +21,10 @@ constexpr float kDepthSlackM = 1.0f;
 constexpr float kLeastWeight = 0.25f / (kMaxStdM * kMaxStdM);
 constexpr float kMostWeight =
     2.0f * static_cast<float>(kMaxCount) / (kMinStdM * kMinStdM);
-// Above what a mission's default_std_m may be.
-constexpr float kMostPriorStdM = 2e4f;
+// A prior may come from a chart and from joined and aged evidence: no more is
+// asked of it than that a reader can reckon with it.
+constexpr float kMostPriorDepthM = 1e5f;
+constexpr float kMostPriorStdM = 1e6f;
 
 // False for a NaN, as every comparison here.
 bool IsDepth(float depth_m) {
@@ -41,18 +43,23 @@ bool IsSound(const PackedEvidence& cell) {
          std::abs(cell.scatter) <= kRangeM * kRangeM * cell.weight;
 }
 
+bool IsPriorDepth(float depth_m) {
+  return std::abs(depth_m) <= kMostPriorDepthM;
+}
+
 bool IsSound(const CellPrior& prior) {
   if (prior.kind == EvidenceKind::kNone || prior.kind == EvidenceKind::kLand) {
     return true;
   }
-  return IsDepth(prior.depth_m) && prior.std_m > 0.0f &&
+  return IsPriorDepth(prior.depth_m) && prior.std_m > 0.0f &&
          prior.std_m <= kMostPriorStdM &&
-         (IsDepth(prior.hazard_m) || prior.hazard_m == CellPrior{}.hazard_m);
+         (IsPriorDepth(prior.hazard_m) ||
+          prior.hazard_m == CellPrior{}.hazard_m);
 }
 
+// The prior is fused in.
 bool IsSound(const NervegnaCell& cell) {
-  return cell.variance_m2 >= 0.0f &&
-         (IsDepth(cell.mean_m) || std::isinf(cell.variance_m2));
+  return cell.variance_m2 >= 0.0f && IsPriorDepth(cell.mean_m);
 }
 
 bool IsSound(const PendingShoal& shoal) {
@@ -60,10 +67,14 @@ bool IsSound(const PendingShoal& shoal) {
          shoal.std_m <= kMaxStdM;
 }
 
+// Measured is where soundings were counted, and nowhere else.
 bool IsSoundAt(const LocalBlock& block, std::size_t k) {
   const PackedEvidence* const fresh = block.evidence.Find(k);
   const PackedEvidence* const moved = block.evidence.FindTransferred(k);
-  return (fresh == nullptr || IsSound(*fresh)) &&
+  const bool counted = (fresh != nullptr && CountOf(*fresh) > 0) ||
+                       (moved != nullptr && CountOf(*moved) > 0);
+  return block.measured(k) == counted &&
+         (fresh == nullptr || IsSound(*fresh)) &&
          (moved == nullptr || IsSound(*moved)) && IsSound(block.prior(k)) &&
          (block.nervegna.empty() || IsSound(block.nervegna[k]));
 }
@@ -80,8 +91,11 @@ absl::Status ValidateBlock(const LocalBlock& block, EstimatorKind estimator) {
   for (std::size_t k = 0; k < kBlockCells; ++k) {
     if (!IsSoundAt(block, k)) {
       return absl::InvalidArgumentError(
-          absl::StrFormat("cell %u holds what no sounding leaves", k));
+          absl::StrFormat("cell %u holds numbers that no sounding leaves", k));
     }
+  }
+  if (estimator != EstimatorKind::kAdaptive && !block.pending.empty()) {
+    return absl::InvalidArgumentError("soundings wait only under adaptive");
   }
   for (std::size_t n = 0; n < block.pending.size(); ++n) {
     const std::uint16_t cell = block.pending[n].cell;

@@ -111,9 +111,9 @@ struct LocalBlock {
   bool measured(std::size_t k) const { return evidence.measured(k); }
 };
 
-// Whether soundings can have left such a block in a map of this estimator: its
-// arrays fit, each number is in the range that the map takes. A reader reckons
-// without looking again.
+// Whether a map of this estimator can hold such a block: its arrays fit, the
+// evidence is of soundings that the map takes, priors are finite. A reader
+// reckons without looking again.
 // Errors: INVALID_ARGUMENT with the first cell that is not so.
 absl::Status ValidateBlock(const LocalBlock& block, EstimatorKind estimator);
 

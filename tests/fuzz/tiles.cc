@@ -1,6 +1,7 @@
 // Fuzz target: blobs of tiles and of local blocks, as far as a start takes
 // them. The first byte chooses the kind, the rest is the payload.
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -53,14 +54,24 @@ void FuzzBlock(ByteSpan payload) {
   options.north_extent_m = 320;
   options.east_extent_m = 320;
   options.cell_size_m = 10;
+  options.smoothing_distance_m = 20;
+  options.smoothing_scale = 0.5;
+  options.estimator = !block->nervegna.empty()  ? map::EstimatorKind::kNervegna
+                      : payload.size() % 4 == 0 ? map::EstimatorKind::kKalman
+                                                : map::EstimatorKind::kAdaptive;
   auto local = map::LocalMap::Create(options);
   FATHOM_FUZZ_CHECK(local.ok());
   if (!local->RestoreBlock({.row = 0, .col = 0}, *block).ok()) return;
   const map::LocalMapView view = local->View();
   for (std::uint32_t row = 0; row < 18; ++row) {
     for (std::uint32_t col = 0; col < 18; ++col) {
-      (void)view.EvidenceAt(view.CellCenter(
-          {static_cast<std::int32_t>(row), static_cast<std::int32_t>(col)}));
+      const map::CellIndex cell = {static_cast<std::int32_t>(row),
+                                   static_cast<std::int32_t>(col)};
+      (void)view.EvidenceAt(view.CellCenter(cell));
+      const auto read = view.AtCell(cell);
+      FATHOM_FUZZ_CHECK(!read.has_value() ||
+                        read->kind != map::EvidenceKind::kMeasured ||
+                        (std::isfinite(read->depth_m) && read->std_m > 0.0f));
     }
   }
 }

@@ -140,7 +140,16 @@ TEST(AnswerBatch, EndsSoonAfterNobodyWantsIt) {
   const auto& states = response.state();
   EXPECT_LE(states.size() - std::count(states.begin(), states.end(),
                                        v1::OBSTACLE_STATE_UNSPECIFIED),
-            2'000);
+            3 * 128);
+  // Whichever thread looks.
+  Workers helpers(3);
+  std::atomic<int> looked = 0;
+  EXPECT_EQ(AnswerBatch(
+                SampleBatch(100'000), kNow, *view, &response,
+                [&looked] { return ++looked >= 3; }, &helpers)
+                .code(),
+            absl::StatusCode::kCancelled);
+  EXPECT_LE(looked, 3 + 3);
 }
 
 TEST(AnswerBatch, HelpersChangeNoAnswer) {
@@ -162,6 +171,13 @@ TEST(AnswerBatch, HelpersChangeNoAnswer) {
         request, kNow, *view, &helped, [] { return false; }, &helpers));
     ASSERT_EQ(helped.SerializeAsString(), alone.SerializeAsString());
   }
+  request.set_with_reasons(true);
+  v1::QueryObstaclesResponse told;
+  FATHOM_ASSERT_OK(AnswerBatch(
+      request, kNow, *view, &told, [] { return false; }, &helpers));
+  EXPECT_EQ(told.mean_depth_m_size(), 10'000);
+  EXPECT_THAT(told.probability(),
+              ::testing::ElementsAreArray(alone.probability()));
 }
 
 TEST(AnswerBatch, GivesTheSameAnswersAsOneByOne) {

@@ -49,6 +49,27 @@ TEST(ForEachPiece, WaitsForNoHelperThatHasNotBegun) {
   EXPECT_EQ(done, 100);
 }
 
+TEST(Workers, AreOfferedAsMuchAsTheyAre) {
+  std::latch release(1);
+  std::latch begun(2);
+  std::atomic<int> done = 0;
+  {
+    Workers two(2);
+    for (int n = 0; n < 2; ++n) {
+      two.Give([&] {
+        begun.count_down();
+        release.wait();
+      });
+    }
+    begun.wait();
+    EXPECT_TRUE(two.Offer([&] { ++done; }));
+    EXPECT_TRUE(two.Offer([&] { ++done; }));
+    EXPECT_FALSE(two.Offer([&] { ++done; }));
+    release.count_down();
+  }
+  EXPECT_EQ(done, 2);
+}
+
 TEST(ForEachPiece, ManyLoopsShareHelpers) {
   Workers helpers(2);
   std::atomic<int> done = 0;

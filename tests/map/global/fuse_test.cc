@@ -81,6 +81,14 @@ TEST(FuseEvidence, TheShoalestHazardStays) {
   EXPECT_EQ(FuseWithPrior(wreck, flat).hazard_m, 5);
 }
 
+// 20 m, 12 000 m and 20 m in one cell: a std of 6 km. 1.645 of it above 20 m is
+// -9850 m, which no tile may hold (a mission with it would not open again).
+TEST(AddShoal, AHazardBeginsNoHigherThanALeafMayHold) {
+  Leaf leaf = MakeLeaf(LeafKind::kMeasured, {.mean_m = 60, .variance_m2 = 1});
+  EXPECT_TRUE(AddShoal({.mean_m = 20, .variance_m2 = 3.6e7}, leaf));
+  EXPECT_EQ(leaf.hazard_m, kMinChartDepthM);
+}
+
 TEST(FuseWithPrior, ABadPriorDoesNotMatterAfterTwoSoundings) {
   // Prior 25 +- 2, truth 10: two soundings of 0.5 m, variance 0.125. Widened to
   // 225 - 0.125: it pulls by 15 * 0.125 / 225 = 8.3 mm.

@@ -414,8 +414,10 @@ TEST(LocalMap, RestoreRefusesWhatDoesNotFit) {
 TEST(LocalMap, RestoreRefusesWhatNoSoundingLeaves) {
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   LocalMap map = MakeMap(TestOptions(EstimatorKind::kAdaptive));
-  const PackedEvidence sound = {
-      .weight = 4.0f, .mean_m = 20.0f, .scatter = 1.0f, .time_count = 2u << 16};
+  const PackedEvidence sound = {.weight = 4.0f,
+                                .mean_m = 20.0f,
+                                .scatter = 1.0f,
+                                .time_count = 2u << 16 | 1u << 31};
   const auto restore =
       [&](const PackedEvidence& fresh, const CellPrior& prior = {},
           const PendingShoal& pending = {.depth_m = 3.0f, .std_m = 0.1f}) {
@@ -450,8 +452,13 @@ TEST(LocalMap, RestoreRefusesWhatNoSoundingLeaves) {
     EXPECT_FALSE(restore(cell).ok()) << "scatter " << bad;
   }
   PackedEvidence uncounted = sound;
-  uncounted.time_count = 0;
+  uncounted.time_count = 1u << 31;
   EXPECT_FALSE(restore(uncounted).ok());
+  // Measured, and yet nothing counted; counted, and yet not measured.
+  EXPECT_FALSE(restore({.time_count = 1u << 31}).ok());
+  PackedEvidence unmeasured = sound;
+  unmeasured.time_count = 2u << 16;
+  EXPECT_FALSE(restore(unmeasured).ok());
   for (const float bad : {kNan, 0.0f, -1.0f, 1e9f}) {
     EXPECT_FALSE(
         restore(sound,
@@ -461,16 +468,35 @@ TEST(LocalMap, RestoreRefusesWhatNoSoundingLeaves) {
     EXPECT_FALSE(restore(sound, {}, {.depth_m = 3.0f, .std_m = bad}).ok())
         << "pending std " << bad;
   }
+  for (const float bad : {kNan, -1e9f, 1e9f}) {
+    EXPECT_FALSE(
+        restore(sound,
+                {.depth_m = bad, .std_m = 1.0f, .kind = EvidenceKind::kPrior})
+            .ok())
+        << "prior " << bad;
+    EXPECT_FALSE(restore(sound, {.depth_m = 20.0f,
+                                 .std_m = 1.0f,
+                                 .kind = EvidenceKind::kPrior,
+                                 .hazard_m = bad})
+                     .ok())
+        << "hazard " << bad;
+  }
   // Land has no depth.
   EXPECT_THAT(restore(sound, {.depth_m = kNan, .kind = EvidenceKind::kLand}),
               IsOk());
   LocalMap nervegna = MakeMap(TestOptions(EstimatorKind::kNervegna));
+  LocalBlock block;
+  block.nervegna.resize(kBlockCells);
+  EXPECT_THAT(nervegna.RestoreBlock({}, block), IsOk());
   for (const float bad : {kNan, -1.0f}) {
-    LocalBlock block;
-    block.nervegna.resize(kBlockCells);
-    block.nervegna[255].variance_m2 = bad;
+    block.nervegna[255] = {.mean_m = 20.0f, .variance_m2 = bad};
     EXPECT_FALSE(nervegna.RestoreBlock({}, block).ok()) << "variance " << bad;
   }
+  block.nervegna[255] = {.mean_m = kNan, .variance_m2 = 1.0f};
+  EXPECT_FALSE(nervegna.RestoreBlock({}, block).ok());
+  block.nervegna[255] = {};
+  block.pending = {{.depth_m = 3.0f, .std_m = 0.1f}};
+  EXPECT_FALSE(nervegna.RestoreBlock({}, block).ok());
 }
 
 }  // namespace

@@ -16,7 +16,7 @@
 namespace fathom::map {
 namespace {
 
-using Bits = std::array<std::uint32_t, 6>;
+using Bits = std::array<std::uint32_t, 9>;
 
 // All cells of a view, as this thread reads them; zeros: no answer.
 std::vector<Bits> ReadAll(const LocalMapView& view) {
@@ -31,8 +31,11 @@ std::vector<Bits> ReadAll(const LocalMapView& view) {
               std::bit_cast<std::uint32_t>(read->std_m),
               std::bit_cast<std::uint32_t>(read->shoalest_m),
               std::bit_cast<std::uint32_t>(read->hazard_m),
+              std::bit_cast<std::uint32_t>(read->variability_m),
+              std::bit_cast<std::uint32_t>(read->cell_size_m),
               read->time_s,
-              std::uint32_t{read->soundings}};
+              std::uint32_t{read->soundings},
+              static_cast<std::uint32_t>(read->kind)};
     }
   }
   return all;

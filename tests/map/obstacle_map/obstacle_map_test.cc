@@ -300,6 +300,42 @@ std::unique_ptr<ObstacleMap> Restored(const ObstacleMapView& view) {
   return map;
 }
 
+// All that the map takes, also what no sea has, is stored and comes back: a
+// hazard begins 4.5 std above its sounding, which here is the sky, goes into
+// the global map and from there into the prior of the next activity.
+TEST(RestoringExtremes, WhateverWasTakenComesBack) {
+  for (const EstimatorKind kind :
+       {EstimatorKind::kNervegna, EstimatorKind::kKalman,
+        EstimatorKind::kAdaptive}) {
+    ObstacleMap map(SmallMission());
+    std::mt19937_64 random(11);
+    const auto pick = [&random](std::initializer_list<float> from) {
+      return from.begin()[random() % from.size()];
+    };
+    for (const std::string id : {"a", "b", "c"}) {
+      StartActivity survey = Survey(id, kind);
+      survey.options.smoothing_distance_m = 20;
+      survey.options.smoothing_scale = 0.5;
+      ASSERT_TRUE(map.Start(survey).ok());
+      ASSERT_TRUE(map.ApplyPing(HitAt(id, 105, 105, -99.5f, 1.2f, 1)).ok());
+      for (int i = 0; i < 600; ++i) {
+        // Few places, so that each is hit often.
+        ASSERT_TRUE(
+            map.ApplyPing(HitAt(id,
+                                5 + 10.0 * static_cast<double>(random() % 12),
+                                5 + 10.0 * static_cast<double>(random() % 12),
+                                pick({-100, -99.5, 0, 20, 60, 12'000}),
+                                pick({1e-4f, 0.1f, 1.2f, 80, 100}), i))
+                .ok());
+      }
+      Restored(*map.View());
+      ASSERT_TRUE(map.Transfer(ActivityId{id}).ok());
+      Restored(*map.View());
+    }
+    EXPECT_EQ(Restored(*map.View())->View()->Digest(), map.View()->Digest());
+  }
+}
+
 class Restoring : public ::testing::TestWithParam<EstimatorKind> {};
 
 TEST_P(Restoring, PiecesPlusReplayGiveTheSameMapDigestForDigest) {
