@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,6 +9,7 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <optional>
 #include <span>
 #include <system_error>
@@ -36,6 +36,8 @@ constexpr std::size_t kMarkBytes = kFrameBytes + 8;
 // A segment is an eighth of the whole, at most this: small enough that room
 // comes back soon, large enough that files are few.
 constexpr std::uint64_t kMostSegmentBytes = 8u << 20;
+// Of a file that is there: marks once went beyond.
+constexpr std::uint64_t kMostFileBytes = kMostSegmentBytes + 4 * kMarkBytes;
 constexpr std::size_t kReadBytes = 1u << 18;
 
 template <typename Word>
@@ -175,6 +177,21 @@ std::optional<Header> DecodeHeader(std::string_view bytes) {
   return header;
 }
 
+std::string SegmentName(const std::string& kind, std::uint64_t first) {
+  return absl::StrFormat("/%s-%020d.spool", kind, first);
+}
+
+// Whether the file is what a power cut leaves of a segment's making: a part of
+// its header, or zeros in its place.
+bool IsCutShort(const std::string& path) {
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (size != kHeaderBytes) return size < kHeaderBytes;
+  std::string bytes(kHeaderBytes, '?');
+  std::ifstream(path, std::ios::binary).read(bytes.data(), kHeaderBytes);
+  return bytes.find_first_not_of('\0') == std::string::npos;
+}
+
 absl::Status NothingThere(const SpoolOptions& options) {
   return absl::NotFoundError(absl::StrFormat(
       "the folder %s holds no buffered %s", options.folder, options.kind));
@@ -309,11 +326,9 @@ absl::Status Spool::OpenSegments() {
   std::sort(paths.begin(), paths.end());
   for (std::size_t i = 0; i < paths.size(); ++i) {
     const bool last = i + 1 == paths.size();
-    if (last && std::filesystem::file_size(paths[i], error) < kHeaderBytes) {
-      // Its making was cut short; nothing was taken into it.
-      if (::unlink(paths[i].c_str()) != 0) {
-        return DiskError("remove", paths[i]);
-      }
+    if (last && IsCutShort(paths[i])) {
+      // Its header was synced before anything was taken into it: nothing was.
+      if (::unlink(paths[i].c_str()) != 0) return DiskError("remove", paths[i]);
       continue;
     }
     Segment segment{.path = paths[i]};
@@ -345,32 +360,32 @@ absl::Status Spool::Scan(Segment& segment, bool last) {
   const int file = ::open(segment.path.c_str(), O_RDONLY | O_CLOEXEC);
   if (file < 0) return DiskError("open", segment.path);
   std::string bytes;
-  struct stat now = {};
-  bool read = ::fstat(file, &now) == 0;
-  const auto file_bytes = static_cast<std::uint64_t>(now.st_size);
-  const bool too_large = file_bytes > kMostSegmentBytes;
-  if (read && !too_large) read = ReadMore(file, 0, file_bytes, bytes);
-  absl::Status status =
-      read ? absl::OkStatus() : DiskError("read", segment.path);
-  if (status.ok() && too_large) {
-    status = Damaged(segment.path, kMostSegmentBytes);
-  }
+  std::error_code error;
+  const std::uint64_t file_bytes = std::min<std::uint64_t>(
+      std::filesystem::file_size(segment.path, error), kMostFileBytes + 1);
+  const absl::Status status = ReadMore(file, 0, file_bytes, bytes)
+                                  ? absl::OkStatus()
+                                  : DiskError("read", segment.path);
   ::close(file);
+  FATHOM_RETURN_IF_ERROR(status);
+  if (file_bytes > kMostFileBytes) return Damaged(segment.path, kMostFileBytes);
   const std::optional<Header> header = DecodeHeader(bytes);
-  if (status.ok() && !header.has_value()) status = Damaged(segment.path, 0);
-  if (status.ok()) {
-    if (source_id_.empty()) source_id_ = header->source_id;
-    if (header->source_id != source_id_) {
-      status = absl::InvalidArgumentError(absl::StrFormat(
-          "the buffer %s holds messages of source \"%s\", not of \"%s\"",
-          options_.folder, header->source_id, source_id_));
-    }
-    epoch_ = header->epoch;
-    segment.first = header->first;
-    segment.bytes = kHeaderBytes;
-    segment.has_marks = header->has_marks;
+  // Under another number it may stand where the next segment is to be.
+  if (!header.has_value() ||
+      !segment.path.ends_with(SegmentName(options_.kind, header->first))) {
+    return Damaged(segment.path, 0);
   }
-  while (status.ok() && segment.bytes < bytes.size()) {
+  if (source_id_.empty()) source_id_ = header->source_id;
+  if (header->source_id != source_id_) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "the buffer %s holds messages of source \"%s\", not of \"%s\"",
+        options_.folder, header->source_id, source_id_));
+  }
+  epoch_ = header->epoch;
+  segment.first = header->first;
+  segment.bytes = kHeaderBytes;
+  segment.has_marks = header->has_marks;
+  while (segment.bytes < bytes.size()) {
     std::size_t size = 0;
     const std::string_view rest = std::string_view(bytes).substr(segment.bytes);
     const Frame frame = LookAtFrame(rest, size);
@@ -383,12 +398,11 @@ absl::Status Spool::Scan(Segment& segment, bool last) {
       continue;
     }
     const bool torn =
-        last &&
-        (segment.has_marks ? !WasSynced(rest, segment.bytes) : IsTornEnd(rest));
-    if (!torn) status = Damaged(segment.path, segment.bytes);
-    break;
+        segment.has_marks ? !WasSynced(rest, segment.bytes) : IsTornEnd(rest);
+    return last && torn ? absl::OkStatus()
+                        : Damaged(segment.path, segment.bytes);
   }
-  return status;
+  return absl::OkStatus();
 }
 
 absl::Status Spool::StartSegment(std::uint64_t first) {
@@ -398,8 +412,7 @@ absl::Status Spool::StartSegment(std::uint64_t first) {
   if (append_ >= 0 && ::fdatasync(append_) != 0) {
     return NoteSync(segments_.back(), false);
   }
-  Segment segment{.path = absl::StrFormat("%s/%s-%020d.spool", options_.folder,
-                                          options_.kind, first),
+  Segment segment{.path = options_.folder + SegmentName(options_.kind, first),
                   .first = first,
                   .bytes = kHeaderBytes};
   const int file =
@@ -428,9 +441,10 @@ absl::Status Spool::StartSegment(std::uint64_t first) {
 }
 
 bool Spool::HasRoom(std::size_t message_bytes) const {
-  // A new segment's header and a mark too, whether they are needed or not.
-  return bytes_ + kHeaderBytes + kFrameBytes + message_bytes + kMarkBytes <=
-         options_.max_bytes;
+  // With a mark and the headers of two segments: one for the message, one for
+  // when the server has it.
+  constexpr std::size_t kAround = 2 * kHeaderBytes + kFrameBytes + kMarkBytes;
+  return bytes_ + kAround + message_bytes <= options_.max_bytes;
 }
 
 absl::Status Spool::Append(std::string_view message) {
@@ -566,7 +580,9 @@ absl::Status Spool::NoteSync(const Segment& synced, bool ok) {
   synced_ = std::max(synced_, synced.end() - 1);
   Segment& growing = segments_.back();
   if (!growing.has_marks || growing.first != synced.first ||
-      synced.count == 0 || synced.is_marked) {
+      synced.count == 0 || synced.is_marked ||
+      growing.bytes + kMarkBytes > kMostSegmentBytes ||
+      bytes_ + kMarkBytes + kHeaderBytes > options_.max_bytes) {
     return broken_;
   }
   // Not synced itself: a process that dies leaves it, a power cut costs at most

@@ -6,7 +6,7 @@
 //   header   "FTHMSPL2", epoch u64, first number u64, source id 64 bytes
 //            padded with zeros, CRC-32C of all that u32
 //   message  size u32 (> 0), CRC-32C of the bytes u32, the bytes; again and
-//            again, and between them after each sync
+//            again, and between them after a sync, where it fits
 //   mark     2^32 - 1 u32, CRC-32C of the rest u32; how much of the file was
 //            synced, bytes u64
 //
@@ -24,10 +24,13 @@
 // What a power cut left of unsynced messages is cut off when the spool is
 // opened again, from the first that is not whole on: a disk writes them in any
 // order. They are in the last segment, and no mark behind them covers them. All
-// other damage is refused (DATA_LOSS), never skipped. Without marks, only one
-// message behind which there are at most zeros is cut off.
+// other damage is refused (DATA_LOSS), never skipped; so is a segment under
+// another number than its header's. Without marks, only one message behind
+// which there are at most zeros is cut off. A last segment that is a part of a
+// header, or zeros of a header's size, goes: its making was cut short.
 //
-// Bounded: the segments never hold more than max_bytes together.
+// Bounded: the segments never hold more than max_bytes together, a new one's
+// header included; opened with more, they take no message and no mark.
 // Cost: one write(2) a message. Thread safety: none.
 
 #ifndef FATHOM_CLIENT_SPOOL_H_

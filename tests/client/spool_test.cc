@@ -14,6 +14,7 @@
 
 #include "absl/strings/str_format.h"
 #include "base/crc32c.h"
+#include "base/mutex.h"
 #include "tests/client/failing_sync.h"
 #include "tests/testing/status_matchers.h"
 
@@ -34,12 +35,17 @@ class SpoolTest : public ::testing::Test {
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
   absl::StatusOr<std::unique_ptr<Spool>> Open(
-      const std::string& source = "uuv-1", std::uint64_t epoch = 7) {
+      const std::string& source = "uuv-1", std::uint64_t epoch = 7,
+      std::uint64_t max_bytes = kLeastSpoolBytes) {
     return Spool::Open({.folder = folder_,
                         .kind = "pings",
                         .source_id = source,
                         .epoch = epoch,
-                        .max_bytes = kLeastSpoolBytes});
+                        .max_bytes = max_bytes});
+  }
+  // Its segments are of 8 MiB, the largest there are.
+  absl::StatusOr<std::unique_ptr<Spool>> OpenLarge() {
+    return Open("uuv-1", 7, 64u << 20);
   }
 
   std::vector<std::string> Segments() const {
@@ -257,6 +263,130 @@ TEST_F(SpoolTest, AFileLargerThanAnyOfOursIsNotRead) {
   FATHOM_ASSERT_OK(Open());
   // 1 TiB of holes.
   std::filesystem::resize_file(Segments().back(), std::uintmax_t{1} << 40);
+  EXPECT_THAT(Open(), StatusIs(absl::StatusCode::kDataLoss));
+}
+
+// A message that comes during a sync has two marks behind it: the sync's, which
+// does not cover it, and the next one's.
+TEST_F(SpoolTest, MarksStayWithinASegment) {
+  // What the last message leaves free: room for a mark, and all but for two.
+  for (const std::size_t spare : {16, 16 + 15}) {
+    const std::string large(4 << 20, 'x');
+    // 92 bytes of header, 8 before each of three.
+    const std::string rest((4u << 20) - 92 - 3 * 8 - 1 - spare, 'y');
+    {
+      FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, OpenLarge());
+      FATHOM_ASSERT_OK(spool->Append(large));
+      FATHOM_ASSERT_OK(spool->Append(rest));
+      Mutex mutex;
+      const MutexLock lock(mutex);
+      {
+        const DuringSync during([&] {
+          const MutexLock inner(mutex);
+          FATHOM_EXPECT_OK(spool->Append("z"));
+        });
+        FATHOM_ASSERT_OK(spool->SyncUnlocked(mutex));
+      }
+      EXPECT_EQ(spool->synced_sequence(), 2u);
+      FATHOM_ASSERT_OK(spool->SyncUnlocked(mutex));
+      EXPECT_EQ(spool->synced_sequence(), 3u);
+    }
+    ASSERT_EQ(Segments().size(), 1u);
+    EXPECT_LE(std::filesystem::file_size(Segments().back()), 8u << 20);
+    for (int life = 0; life < 2; ++life) {
+      FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, OpenLarge());
+      EXPECT_EQ(ReadAll(*spool), (std::vector{large, rest, std::string("z")}));
+    }
+    EXPECT_LE(std::filesystem::file_size(Segments().back()), 8u << 20);
+    std::filesystem::remove(Segments().back());
+  }
+}
+
+TEST_F(SpoolTest, AFileThatMarksOnceMadeTooLargeIsRead) {
+  const std::string large(4 << 20, 'x');
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, OpenLarge());
+    FATHOM_ASSERT_OK(spool->Append(large));
+    FATHOM_ASSERT_OK(spool->Append(large.substr(92 + 2 * 8 + 16)));
+    FATHOM_ASSERT_OK(spool->Sync());
+    EXPECT_EQ(spool->bytes(), 8u << 20);
+  }
+  const std::string path = Segments().back();
+  std::string mark(16, '\0');
+  std::ifstream(path, std::ios::binary)
+      .seekg(-16, std::ios::end)
+      .read(mark.data(), 16);
+  std::ofstream(path, std::ios::app | std::ios::binary) << mark;
+  for (int life = 0; life < 2; ++life) {
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, OpenLarge());
+    EXPECT_EQ(ReadAll(*spool).size(), 2u + static_cast<std::size_t>(life));
+    FATHOM_ASSERT_OK(spool->Append("next"));
+    EXPECT_EQ(Segments().size(), 2u);
+  }
+}
+
+TEST_F(SpoolTest, StaysWithinItsBytes) {
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
+    // Three headers (that of its segment, and of two to come), 8 before it, and
+    // a mark.
+    const std::size_t most = kLeastSpoolBytes - 3 * 92 - 8 - 16;
+    EXPECT_TRUE(spool->HasRoom(most));
+    EXPECT_FALSE(spool->HasRoom(most + 1));
+  }
+  std::uint64_t bytes = 0;
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, OpenLarge());
+    const std::string message(1 << 20, 'x');
+    for (int i = 0; i < 17; ++i) FATHOM_ASSERT_OK(spool->Append(message));
+    bytes = spool->bytes();
+  }
+  // With less than there is: not a mark more.
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
+  EXPECT_EQ(spool->bytes(), bytes);
+  EXPECT_EQ(spool->synced_sequence(), 17u);
+  EXPECT_EQ(ReadAll(*spool).size(), 17u);
+}
+
+TEST_F(SpoolTest, ASegmentUnderAnotherNumberIsRefused) {
+  FATHOM_ASSERT_OK(Open());
+  const std::string first = Segments().back();
+  const std::string second = folder_ + "/pings-00000000000000000002.spool";
+  // Both say that they begin with message 1.
+  std::filesystem::copy(first, second);
+  EXPECT_THAT(Open(), StatusIs(absl::StatusCode::kDataLoss,
+                               HasSubstr(second + " is damaged at byte 0")));
+  std::filesystem::remove(first);
+  EXPECT_THAT(Open(), StatusIs(absl::StatusCode::kDataLoss, HasSubstr(second)));
+  std::filesystem::rename(second, first);
+  FATHOM_EXPECT_OK(Open());
+}
+
+// A power cut may spare a file's size and none of its bytes.
+TEST_F(SpoolTest, AMakingCutShortToZerosHoldsNothing) {
+  const auto make_zeros = [this](int number, std::uintmax_t size) {
+    const std::string path =
+        absl::StrFormat("%s/pings-%020d.spool", folder_, number);
+    std::ofstream(path).close();
+    std::filesystem::resize_file(path, size);
+    return path;
+  };
+  make_zeros(1, 92);
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
+    FATHOM_ASSERT_OK(spool->Append("a"));
+  }
+  make_zeros(2, 92);
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto spool, Open());
+    EXPECT_EQ(Segments().size(), 1u);
+    EXPECT_EQ(ReadAll(*spool), std::vector<std::string>{"a"});
+  }
+  // No header is larger, and none but the last is not whole.
+  const std::string larger = make_zeros(2, 93);
+  EXPECT_THAT(Open(), StatusIs(absl::StatusCode::kDataLoss));
+  std::filesystem::remove(larger);
+  make_zeros(0, 92);
   EXPECT_THAT(Open(), StatusIs(absl::StatusCode::kDataLoss));
 }
 

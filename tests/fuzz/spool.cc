@@ -2,8 +2,9 @@
 //
 // The input: flags u8, size of the first of two files u16; the files one after
 // the other. Flag 1: their headers get a right checksum; flag 2: so do messages
-// and marks, one after the other; flag 4: there is one file alone. Without that
-// no mutation would pass the door.
+// and marks, one after the other; flag 4: there is one file alone; flag 8: they
+// are named 1 and 2, not by their headers. Without that no mutation would pass
+// the door.
 
 #include "client/spool.h"
 
@@ -17,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "absl/strings/str_format.h"
 #include "base/crc32c.h"
 #include "tests/fuzz/fuzz.h"
 #include "tests/storage/temp_dir.h"
@@ -60,19 +62,30 @@ void SealFile(std::vector<std::uint8_t>& file, unsigned flags) {
 
 class Folder {
  public:
-  void Write(const Files& files) const {
+  void Write(const Files& files, bool by_place) {
+    paths_.clear();
     for (const auto& entry :
          std::filesystem::directory_iterator(folder_.path())) {
       std::filesystem::remove(entry);
     }
     for (std::size_t i = 0; i < files.size(); ++i) {
-      std::ofstream out(Path(i), std::ios::binary);
+      std::uint64_t number = i + 1;
+      if (!by_place && files[i].size() >= kHeaderBytes) {
+        number = GetU32(&files[i][16]) | std::uint64_t{GetU32(&files[i][20])}
+                                             << 32;
+      }
+      std::string path =
+          folder_.File(absl::StrFormat("pings-%020d.spool", number));
+      // Never two under one name.
+      if (i > 0 && path == paths_[0]) path.insert(path.size() - 6, "-again");
+      paths_.push_back(path);
+      std::ofstream out(path, std::ios::binary);
       out.write(reinterpret_cast<const char*>(files[i].data()),
                 static_cast<std::streamsize>(files[i].size()));
     }
   }
   std::vector<std::uint8_t> Read(std::size_t i) const {
-    std::ifstream in(Path(i), std::ios::binary);
+    std::ifstream in(paths_[i], std::ios::binary);
     return {std::istreambuf_iterator<char>(in), {}};
   }
   absl::StatusOr<std::unique_ptr<Spool>> Open() const {
@@ -83,12 +96,8 @@ class Folder {
   }
 
  private:
-  std::string Path(std::size_t i) const {
-    return folder_.File("pings-0000000000000000000" + std::to_string(i + 1) +
-                        ".spool");
-  }
-
   const storage::TempDir folder_;
+  std::vector<std::string> paths_;
 };
 
 std::vector<std::string> ReadAll(Spool& spool) {
@@ -140,8 +149,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes,
   if ((flags & 4) == 0) files.push_back({bytes + cut, bytes + size});
   for (auto& file : files) SealFile(file, flags);
 
-  static const Folder folder;
-  folder.Write(files);
+  static Folder folder;
+  folder.Write(files, (flags & 8) != 0);
   auto spool = folder.Open();
   if (spool.ok()) {
     UseIt(folder, *std::move(spool));
