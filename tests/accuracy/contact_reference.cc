@@ -9,6 +9,7 @@
 
 #include "map/query/disc_probability.h"
 #include "tests/accuracy/contacts.h"
+#include "tests/testing/worse.h"
 
 namespace fathom::accuracy {
 namespace {
@@ -31,7 +32,7 @@ class Rows {
     double worst = 0;
     nlohmann::json each = nlohmann::json::array();
     for (const auto& [row, error] : errors) {
-      worst = std::max(worst, error);
+      worst = testing::WorseOf(worst, error);
       each.push_back({{"row", row}, {"error", error}});
     }
     rows_.push_back({{"scene", scene},

@@ -8,15 +8,18 @@
 #include <string>
 #include <utility>
 
+#include "tests/testing/worse.h"
+
 namespace fathom::accuracy {
 
-// The worst of what it was offered, and whether all stayed within.
+// The worst of what it was offered, and whether all stayed within; NaN does
+// not.
 class Limit {
  public:
   Limit(std::string what, double most) : what_(std::move(what)), most_(most) {}
 
   void Offer(double value, const std::string& where) {
-    if (offered_ && value <= worst_) return;
+    if (offered_ && !testing::IsWorse(value, worst_)) return;
     offered_ = true;
     worst_ = value;
     where_ = where;

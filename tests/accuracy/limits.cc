@@ -68,7 +68,7 @@ int CheckLimits(const nlohmann::json& report) {
       others = std::min(others, row["brier"].get<double>());
     }
   }
-  if (ours > 0) brier.Offer(ours / others, "all");
+  if (ours != 0) brier.Offer(ours / others, "all");
   missed += bins.Report() + free.Report() + brier.Report();
 
   Limit prior("rmse with a prior 15 m off / without, two hits", 1.10);

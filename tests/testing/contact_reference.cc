@@ -9,6 +9,7 @@
 #include "map/query/closest_approach.h"
 #include "map/query/disc_probability.h"
 #include "tests/testing/shared_numbers.h"
+#include "tests/testing/worse.h"
 
 namespace fathom::testing {
 namespace {
@@ -75,8 +76,10 @@ ReferenceErrors ConversionErrors(const std::string& folder, FilterKind kind) {
     Eigen::Matrix2d R;
     R << n[7], n[8], n[8], n[9];
     errors.push_back(
-        {line, std::max((got.z - z).cwiseAbs().maxCoeff() / n[0],
-                        (got.R - R).cwiseAbs().maxCoeff() / R.trace())});
+        {line,
+         WorseOf((got.z - z).cwiseAbs().maxCoeff<Eigen::PropagateNaN>() / n[0],
+                 (got.R - R).cwiseAbs().maxCoeff<Eigen::PropagateNaN>() /
+                     R.trace())});
   }
   return errors;
 }
@@ -141,7 +144,7 @@ ReferenceErrors SteadyStateErrors(const std::string& folder, FilterKind kind) {
       // K = P C' R^-1 with the updated P.
       const double ours[] = {pp / n[2], pv / n[2], pp, pv, vv};
       for (std::size_t i = 0; i < 5; ++i) {
-        worst = std::max(worst, std::fabs(ours[i] / n[3 + i] - 1));
+        worst = WorseOf(worst, std::fabs(ours[i] / n[3 + i] - 1));
       }
     }
     errors.push_back({line, worst});
@@ -300,8 +303,8 @@ ReferenceErrors EncounterErrors(const std::string& folder) {
       const map::PlaneApproach approach = map::FindApproach(
           {.offset_m = offset,
            .velocity_m_s = Along(n[6] * kKnotMPerS, course_deg) - own});
-      return std::max(std::fabs(approach.tcpa_s / 60 - n[2]) / 0.001,
-                      std::fabs(approach.distance_m - n[3]) / 0.2);
+      return WorseOf(std::fabs(approach.tcpa_s / 60 - n[2]) / 0.001,
+                     std::fabs(approach.distance_m - n[3]) / 0.2);
     };
     double best_deg = 0;
     for (double step = 0.002, low = 0, high = 360; step > 1e-6; step /= 20) {

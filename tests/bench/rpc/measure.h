@@ -1,4 +1,5 @@
 // What the load programs measure with.
+
 #ifndef FATHOM_TESTS_BENCH_RPC_MEASURE_H_
 #define FATHOM_TESTS_BENCH_RPC_MEASURE_H_
 

@@ -90,7 +90,11 @@ class PingLoad {
   // After Stop.
   std::vector<double>& ack_ms() { return ack_ms_; }
   std::uint64_t sent() const { return sent_; }
-  const grpc::Status& status() const { return status_; }
+  // How the stream ended.
+  absl::Status End() const {
+    if (status_.ok()) return absl::OkStatus();
+    return absl::InternalError("pings: " + status_.error_message());
+  }
 
  private:
   // About what a quick stream has under way between two commits; more would
@@ -250,6 +254,7 @@ absl::Status AskNull(const client::Client& null,
   pings.Stop();
   const double lasted_s = SecondsSince(start);
   FATHOM_RETURN_IF_ERROR(loaded.status());
+  FATHOM_RETURN_IF_ERROR(pings.End());
   window["null_idle_p50_us"] = Quantile(idle, 0.5);
   window["null_idle_p99_us"] = Quantile(idle, 0.99);
   window["null_query_p50_us"] = Quantile(*loaded, 0.5);
@@ -287,9 +292,7 @@ absl::Status Run(const std::string& address, const std::string& null_address,
     const double lasted_s = SecondsSince(start);
     FATHOM_RETURN_IF_ERROR(side.Stop());
     FATHOM_RETURN_IF_ERROR(loaded.status());
-    if (!pings.status().ok()) {
-      return absl::InternalError("pings: " + pings.status().error_message());
-    }
+    FATHOM_RETURN_IF_ERROR(pings.End());
     const double reached_per_s = static_cast<double>(pings.sent()) / lasted_s;
     nlohmann::json row = {
         {"window", window},
