@@ -71,7 +71,7 @@ class BufferedStreamTest : public ::testing::Test {
   // many that were.
   static std::uint64_t Fill(BufferedPingStream& stream) {
     v1::Ping ping = MakePing();
-    const std::uint64_t one = ping.ByteSizeLong() + 200;
+    const std::uint64_t one = ping.ByteSizeLong() + 300;
     while (stream.state().bytes + one <= kLeastSpoolBytes) {
       FATHOM_EXPECT_OK(stream.Send(ping));
     }
@@ -80,7 +80,7 @@ class BufferedStreamTest : public ::testing::Test {
     ping.clear_bearing_deg();
     ping.clear_depth_m();
     ping.clear_std_m();
-    const std::uint64_t small = ping.ByteSizeLong() + 200;
+    const std::uint64_t small = ping.ByteSizeLong() + 300;
     while (stream.state().bytes + small <= kLeastSpoolBytes) {
       FATHOM_EXPECT_OK(stream.Send(ping));
     }
