@@ -437,11 +437,6 @@ TEST(LocalMap, RestoreRefusesWhatNoSoundingLeaves) {
     PackedEvidence cell = sound;
     cell.mean_m = bad;
     EXPECT_FALSE(restore(cell).ok()) << "mean " << bad;
-    EXPECT_FALSE(
-        restore(sound,
-                {.depth_m = bad, .std_m = 1.0f, .kind = EvidenceKind::kPrior})
-            .ok())
-        << "prior " << bad;
     EXPECT_FALSE(restore(sound, {}, {.depth_m = bad, .std_m = 0.1f}).ok())
         << "pending " << bad;
   }
