@@ -26,10 +26,20 @@ void VisitTiles(const Tile& tile,
 }
 
 using LeafVisitor = absl::FunctionRef<void(const CellKey&, const Leaf&)>;
+using TileSkipper = absl::FunctionRef<bool(const TileTotals&)>;
+
+// The tile of which the cell is the root; null if there is none.
+const Tile* TileOf(const Tile& root, const CellKey& cell) {
+  const Tile* tile = &root;
+  while (tile != nullptr && tile->key().level < cell.level) {
+    tile = tile->Find(PositionInTile(cell, tile->key().level)).child;
+  }
+  return tile != nullptr && tile->key().level == cell.level ? tile : nullptr;
+}
 
 // The leaves of the cell that the box touches.
-void VisitLeavesIn(const Tile& root, const CellKey& cell, const LatticeBox& box,
-                   LeafVisitor visit) {
+void VisitLeavesIn(const Tile& root, int max_level, const CellKey& cell,
+                   const LatticeBox& box, LeafVisitor visit, TileSkipper skip) {
   const int up = kMaxLevel - cell.level;
   const std::uint32_t row = cell.row << up;
   const std::uint32_t col = cell.col << up;
@@ -48,12 +58,17 @@ void VisitLeavesIn(const Tile& root, const CellKey& cell, const LatticeBox& box,
           found.leaf);
     return;
   }
+  // Tiles begin at these levels (TileLadder) and at the top.
+  if ((max_level - cell.level) % kTileLevels == 0 || cell.level == 0) {
+    const Tile* const tile = TileOf(root, cell);
+    if (tile != nullptr && skip(tile->totals())) return;
+  }
   for (std::uint32_t quarter = 0; quarter < 4; ++quarter) {
-    VisitLeavesIn(root,
+    VisitLeavesIn(root, max_level,
                   {.level = static_cast<std::uint8_t>(cell.level + 1),
                    .row = cell.row * 2 + quarter / 2,
                    .col = cell.col * 2 + quarter % 2},
-                  box, visit);
+                  box, visit, skip);
   }
 }
 
@@ -140,18 +155,18 @@ std::optional<std::pair<CellKey, Leaf>> GlobalMapView::LeafAt(
                    found.leaf};
 }
 
-void GlobalMapView::ForEachLeafIn(const LatticeBox& box,
-                                  LeafVisitor visit) const {
+void GlobalMapView::ForEachLeafIn(const LatticeBox& box, LeafVisitor visit,
+                                  TileSkipper skip) const {
   if (root_tile_ == nullptr) return;
   // From the least cell that holds the box.
   const std::uint32_t differ =
       (box.row_first ^ box.row_last) | (box.col_first ^ box.col_last);
   const int up = static_cast<int>(std::bit_width(differ));
-  VisitLeavesIn(*root_tile_,
+  VisitLeavesIn(*root_tile_, root_.max_level(),
                 {.level = static_cast<std::uint8_t>(kMaxLevel - up),
                  .row = box.row_first >> up,
                  .col = box.col_first >> up},
-                box, visit);
+                box, visit, skip);
 }
 
 std::optional<DepthBounds> GlobalMapView::Bounds(const CellKey& cell) const {

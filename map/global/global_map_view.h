@@ -65,7 +65,14 @@ class GlobalMapView {
   // a place with the box, in Z-order. About 25 ns a leaf.
   void ForEachLeafIn(
       const LatticeBox& box,
-      absl::FunctionRef<void(const CellKey&, const Leaf&)> visit) const;
+      absl::FunctionRef<void(const CellKey&, const Leaf&)> visit) const {
+    ForEachLeafIn(box, visit, [](const TileTotals&) { return false; });
+  }
+  // The same but for the leaves of tiles, and of all tiles below them, of
+  // whose totals `skip` says so; it is asked when their first leaf is due.
+  void ForEachLeafIn(const LatticeBox& box,
+                     absl::FunctionRef<void(const CellKey&, const Leaf&)> visit,
+                     absl::FunctionRef<bool(const TileTotals&)> skip) const;
 
   // Answers "could anything in this cell be shallower than z?" without opening
   // it. nullopt: nothing is known in the cell. Where the map is coarser than

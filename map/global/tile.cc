@@ -124,7 +124,6 @@ std::shared_ptr<const Tile> Tile::Build(
   std::uint32_t first_s = 0;
   bool any_known = false;
   bool times_differ = false;
-  std::uint32_t earliest_s = 0;
   std::uint32_t latest_s = 0;
   TileTotals totals;
   for (const Leaf& leaf : leaves) {
@@ -142,10 +141,10 @@ std::shared_ptr<const Tile> Tile::Build(
     if (!any_known) first_s = leaf.time_s;
     any_known = true;
     times_differ = times_differ || leaf.time_s != first_s;
-    if (leaf.time_s == 0) continue;
-    if (earliest_s == 0 || leaf.time_s < earliest_s) earliest_s = leaf.time_s;
+    totals.AddStdAndTime(leaf.std_m(), leaf.time_s);
     latest_s = std::max(latest_s, leaf.time_s);
   }
+  const std::uint32_t earliest_s = totals.earliest_s;
   // Charts and quick surveys: one time for all.
   const std::uint32_t time_s = first_s;
   const bool one_time = children.empty() && !times_differ;
@@ -246,6 +245,7 @@ void Tile::AddChildren() {
     totals.memory_bytes += below.memory_bytes;
     totals.shoalest_m = std::min(totals.shoalest_m, below.shoalest_m);
     totals.deepest_m = std::max(totals.deepest_m, below.deepest_m);
+    totals.AddStdAndTime(below.largest_std_m, below.earliest_s);
   }
 }
 

@@ -83,6 +83,18 @@ struct TileTotals {
   // Uncertainty is not included.
   float shoalest_m = std::numeric_limits<float>::infinity();
   float deepest_m = -std::numeric_limits<float>::infinity();
+  // Of known leaves: the greatest predictive std, metres (0: none is known);
+  // the earliest time that is known, Unix seconds (0: none).
+  float largest_std_m = 0;
+  std::uint32_t earliest_s = 0;
+
+  // Adds those of a leaf or of a child tile.
+  void AddStdAndTime(float std_m, std::uint32_t time_s) {
+    largest_std_m = std::max(largest_std_m, std_m);
+    if (time_s != 0 && (earliest_s == 0 || time_s < earliest_s)) {
+      earliest_s = time_s;
+    }
+  }
 };
 
 class Tile {

@@ -277,7 +277,11 @@ class Checker {
     }
     const std::optional<LatticeBox> box = root.BoxAround(corners);
     if (!box.has_value() || !status_.ok()) return;
-    global.ForEachLeafIn(*box, [&](const CellKey& cell, const Leaf& leaf) {
+    const auto skip = [&](const TileTotals& tile) {
+      return check_.skip_deep && !covered && !on_activity_ &&
+             CannotMatter(tile);
+    };
+    const auto judge = [&](const CellKey& cell, const Leaf& leaf) {
       if (!status_.ok()) return;
       const double side_m = root.cell_size_m(cell.level);
       if (covered && side_m >= covering_cell_m) return;
@@ -313,7 +317,49 @@ class Checker {
       } else {
         Judge(placed, std::nullopt);
       }
-    });
+    };
+    global.ForEachLeafIn(*box, judge, skip);
+  }
+
+  // True: no leaf of the tile or below it, judged on the piece, changes the
+  // verdict: each is FREE, none leaves less water than the leg's least, and
+  // none has a greater P than its worst (to the 1e-10 of P's table). A contact
+  // near adds to P everywhere: then nothing is skipped.
+  bool CannotMatter(const TileTotals& tile) const {
+    const LegVerdict& leg = verdict_.legs.back();
+    if (!contacts_->empty() || !leg.least_clearance_m.has_value()) return false;
+    if (tile.known_leaves < tile.leaves && !trajectory_.unknown_is_free) {
+      return false;
+    }
+    const double first = piece_->ShareOfLeg(0.0);
+    const double last = piece_->ShareOfLeg(1.0);
+    ObstacleQuery query = query_;
+    query.depth_m = std::max(leg_->DepthAt(first), leg_->DepthAt(last));
+    query.time = leg_->TimeAt(last);
+    const double shoalest_m{tile.shoalest_m};
+    // A hazard or land in it ends here.
+    if (shoalest_m <= query.depth_m + query.vertical_clearance_m ||
+        shoalest_m - query.depth_m < *leg.least_clearance_m) {
+      return false;
+    }
+    // Above the seabed P grows with std and age.
+    const DepthEstimate worst = {.depth_m = tile.shoalest_m,
+                                 .std_m = tile.largest_std_m,
+                                 .kind = EvidenceKind::kMeasured,
+                                 .time_s = tile.earliest_s};
+    const ObstacleAnswer most =
+        SeabedAnswer(query, SeabedEstimate{.estimate = worst});
+    return most.state == ObstacleState::kFree &&
+           most.probability <= leg.worst_probability;
+  }
+
+  // Without contacts.
+  ObstacleAnswer SeabedAnswer(
+      const ObstacleQuery& query,
+      const std::optional<SeabedEstimate>& seabed) const {
+    static const ContactsView kNoContacts;
+    return Answer(query, seabed, kNoContacts,
+                  {.ageing_rate_m2_s = view_.ageing_rate_m2_s()});
   }
 
   // The least cell size of the open activities that hold all four corners;
@@ -364,10 +410,7 @@ class Checker {
   // conflict.
   void Weigh(const std::optional<SeabedEstimate>& seabed,
              const GeodeticPoint& place) {
-    static const ContactsView kNoContacts;
-    ObstacleAnswer answer =
-        Answer(query_, seabed, kNoContacts,
-               {.ageing_rate_m2_s = view_.ageing_rate_m2_s()});
+    ObstacleAnswer answer = SeabedAnswer(query_, seabed);
     if (!contacts_->empty()) contacts_->AddTo(query_, answer);
     LegVerdict& leg = verdict_.legs.back();
     leg.worst_probability = std::max(leg.worst_probability, answer.probability);

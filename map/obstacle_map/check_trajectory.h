@@ -5,7 +5,10 @@
 //   - each cell of an open activity, by what SeabedAt says of its middle;
 //   - each leaf of the global map that reaches beyond the activities, or is
 //     finer than their cells.
-// None is skipped (tests hold it to brute force). What counts is the deepest
+// Tests hold it to brute force, and to a walk of all leaves what is left out:
+// tiles of the global map (64 x 64 cells, and all below them) whose shoalest
+// depth, greatest std and earliest time show that they cannot change the leg's
+// verdict: wide paths over water that deepens. What counts is the deepest
 // the vehicle may be while its disc touches the cell. A leaf that an activity
 // covers in part counts as a whole where the piece itself leaves the activity.
 //
@@ -26,8 +29,12 @@ namespace fathom::map {
 struct TrajectoryCheck {
   // End with the leg of the first conflict.
   bool stop_at_first = false;
-  // Cells that may be read.
+  // Cells that may be read. Those of tiles left out do not count; where a
+  // contact comes near they are read and do.
   std::uint64_t most_cells = 4'000'000;
+  // Leave out parts of the global map that cannot change the verdict; false:
+  // read every leaf, to prove it and to measure it.
+  bool skip_deep = true;
   // Ends the work soon after it becomes true; null: never.
   const std::atomic<bool>* stop = nullptr;
 };

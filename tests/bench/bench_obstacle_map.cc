@@ -273,6 +273,49 @@ void BM_CheckTrajectory(benchmark::State& state) {
 }
 BENCHMARK(BM_CheckTrajectory)->Unit(benchmark::kMillisecond);
 
+// 5 km over a chart of 10 m cells, no two alike, that falls a metre in range(1)
+// metres, by a vehicle that knows its place to 100 m. range(0): 1 as asked, 0
+// with every leaf read.
+void BM_CheckWideTrajectory(benchmark::State& state) {
+  ObstacleMap map(SmallMission());
+  std::mt19937 random(4);
+  std::uniform_real_distribution<float> relief(-0.5f, 0.5f);
+  RasterBlock chart = FlatChart(0, 0.5f);
+  chart.north_west = Place(5500, 0);
+  chart.latitude_step_deg = 10 / 111'000.0;
+  chart.longitude_step_deg = 10 / 83'000.0;
+  chart.rows = 550;
+  chart.columns = 100;
+  chart.depth_m.clear();
+  for (std::uint32_t k = 0; k < chart.rows * chart.columns; ++k) {
+    // Rows go from north, where it is deepest, to south.
+    const auto north_m =
+        10.0f * static_cast<float>(chart.rows - 1 - k / chart.columns);
+    chart.depth_m.push_back(30 + north_m / static_cast<float>(state.range(1)) +
+                            relief(random));
+  }
+  if (!map.Import(chart, true).ok()) std::abort();
+  Trajectory path;
+  path.radius_m = 2;
+  path.position_std_m = 100;
+  path.unknown_is_free = true;
+  path.waypoints = {
+      {.position = Place(100, 500), .depth_m = 10, .time = At(0)},
+      {.position = Place(5100, 500), .depth_m = 10, .time = At(2500)}};
+  const ViewPtr view = map.View();
+  std::uint64_t cells = 0;
+  for (auto _ : state) {
+    const auto verdict =
+        CheckTrajectory(*view, path, {.skip_deep = state.range(0) == 1});
+    if (!verdict.ok()) std::abort();
+    cells = verdict->cells;
+  }
+  state.counters["cells"] = static_cast<double>(cells);
+}
+BENCHMARK(BM_CheckWideTrajectory)
+    ->ArgsProduct({{1, 0}, {100, 1'000'000}})
+    ->Unit(benchmark::kMillisecond);
+
 BENCHMARK(BM_Transfer1MCells)
     ->Iterations(1)
     ->UseManualTime()
