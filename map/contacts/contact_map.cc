@@ -318,6 +318,7 @@ ContactOutcome ContactMap::Drop(const ContactKey& named, Time time) {
 }
 
 ContactsView ContactMap::View() {
+  if (set_->epoch == epoch_) set_->index.Settle();
   ++epoch_;
   return ContactsView(set_);
 }

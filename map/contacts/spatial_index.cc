@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "absl/base/macros.h"
 #include "map/contacts/contacts_view.h"
 
 namespace fathom::map {
@@ -240,6 +241,9 @@ SpatialEntry MakeSpatialEntry(const Contact& contact,
 struct SpatialIndex::Node {
   std::uint64_t epoch = 0;
   SpatialBounds bounds;
+  // `bounds` are of what is there. If not, nor is the node above, and both are
+  // of the current epoch.
+  bool settled = false;
   bool leaf = true;
   std::array<std::shared_ptr<Node>, 4> children;
   std::vector<SpatialEntry> entries;
@@ -267,15 +271,21 @@ SpatialIndex::Node& SpatialIndex::Own(std::shared_ptr<Node>& node,
     node = std::make_shared<Node>(*node);
     node->epoch = epoch;
   }
+  node->settled = false;
   return *node;
 }
 
-void SpatialIndex::Insert(const SpatialEntry& entry, std::uint64_t epoch) {
-  Add(entry, epoch);
-  Settle();
+void SpatialIndex::Settle(Node& node) {
+  if (node.settled) return;
+  for (const auto& child : node.children) {
+    if (child != nullptr) Settle(*child);
+  }
+  node.Bound();
+  node.settled = true;
 }
 
 void SpatialIndex::Settle() {
+  if (root_ != nullptr) Settle(*root_);
   top_ = root_.get();
   while (top_ != nullptr && !top_->leaf) {
     const Node* only = nullptr;
@@ -288,13 +298,12 @@ void SpatialIndex::Settle() {
   }
 }
 
-void SpatialIndex::Add(const SpatialEntry& entry, std::uint64_t epoch) {
+void SpatialIndex::Insert(const SpatialEntry& entry, std::uint64_t epoch) {
+  top_ = nullptr;
   std::shared_ptr<Node>* slot = &root_;
   int level = 0;
   while (true) {
     Node& node = Own(*slot, epoch);
-    // Bounds only grow on the way down: no need to look at the siblings.
-    node.bounds.Include(entry.bounds);
     if (node.leaf) {
       node.entries.push_back(entry);
       if (node.entries.size() <= kLeafEntries || level == kLevels) return;
@@ -302,7 +311,6 @@ void SpatialIndex::Add(const SpatialEntry& entry, std::uint64_t epoch) {
       for (const SpatialEntry& moved : node.entries) {
         Node& child = Own(node.children[ChildAt(moved.code, level)], epoch);
         child.entries.push_back(moved);
-        child.bounds.Include(moved.bounds);
       }
       node.entries.clear();
       // All of them may have gone to one child: divide that on its turn, when
@@ -330,17 +338,16 @@ std::optional<SpatialEntry> SpatialIndex::Find(const Contact* contact,
 void SpatialIndex::Remove(const Contact* contact, std::uint64_t code,
                           std::uint64_t epoch) {
   Change(contact, code, nullptr, epoch);
-  Settle();
 }
 
 void SpatialIndex::Replace(const Contact* contact, std::uint64_t code,
                            const SpatialEntry& entry, std::uint64_t epoch) {
-  if (!Change(contact, code, &entry, epoch)) Add(entry, epoch);
-  Settle();
+  if (!Change(contact, code, &entry, epoch)) Insert(entry, epoch);
 }
 
 bool SpatialIndex::Change(const Contact* contact, std::uint64_t code,
                           const SpatialEntry* entry, std::uint64_t epoch) {
+  top_ = nullptr;
   bool replaced = false;
   std::array<std::shared_ptr<Node>*, kLevels + 1> path;
   std::size_t depth = 0;
@@ -366,14 +373,7 @@ bool SpatialIndex::Change(const Contact* contact, std::uint64_t code,
     }
     slot = &node.children[ChildAt(code, static_cast<int>(depth) - 1)];
   }
-  while (depth > 0) {
-    std::shared_ptr<Node>& node = *path[--depth];
-    if (node->Empty()) {
-      node.reset();
-    } else {
-      node->Bound();
-    }
-  }
+  while (depth > 0 && (*path[depth - 1])->Empty()) path[--depth]->reset();
   return replaced;
 }
 
@@ -381,7 +381,8 @@ void SpatialIndex::ForEachCandidate(
     const GeodeticPoint& point, double reach_m, Time t,
     absl::FunctionRef<void(const Contact&)> visit) const {
   // A move leaves top_ behind.
-  if (root_ == nullptr || top_ == nullptr) return;
+  if (root_ == nullptr) return;
+  ABSL_ASSERT(top_ != nullptr);  // Settled.
   const UnitVector at = QuickUnitVector(point);
   // Depth first; at most three siblings wait on each level.
   std::array<const Node*, 3 * kLevels + 4> waiting;

@@ -8,7 +8,8 @@
 //
 // Copy on write: nodes made since the last snapshot (same epoch) are changed
 // in place, others are copied along the path from the root. One thread
-// writes; a snapshot (a copy of the root's pointer) is immutable.
+// writes; a snapshot (a copy of the root's pointer) is immutable. Bounds are
+// made once for all changes since the snapshot before, by Settle.
 
 #ifndef FATHOM_MAP_CONTACTS_SPATIAL_INDEX_H_
 #define FATHOM_MAP_CONTACTS_SPATIAL_INDEX_H_
@@ -86,7 +87,8 @@ class SpatialIndex {
  public:
   // Adds an entry, or takes out the entry of `contact` (which was added with
   // `code`), if it is there. `epoch`: nodes of another epoch are shared with a
-  // snapshot and are copied. O(depth).
+  // snapshot and are copied. O(depth). Settle before the next question or
+  // snapshot.
   void Insert(const SpatialEntry& entry, std::uint64_t epoch);
   void Remove(const Contact* contact, std::uint64_t code, std::uint64_t epoch);
 
@@ -99,8 +101,12 @@ class SpatialIndex {
   void Replace(const Contact* contact, std::uint64_t code,
                const SpatialEntry& entry, std::uint64_t epoch);
 
+  // Makes the bounds of what was changed. O(1) a node changed since the last
+  // call: a leaf where ten contacts reported is bounded once.
+  void Settle();
+
   // Every contact that may at `t` be within reach_m of `point`, and some that
-  // may not; in no particular order.
+  // may not; in no particular order. REQUIRES: settled.
   void ForEachCandidate(const GeodeticPoint& point, double reach_m, Time t,
                         absl::FunctionRef<void(const Contact&)> visit) const;
 
@@ -110,16 +116,15 @@ class SpatialIndex {
   // `entry` in its place; whether it did that.
   bool Change(const Contact* contact, std::uint64_t code,
               const SpatialEntry* entry, std::uint64_t epoch);
-  // Insert without Settle.
-  void Add(const SpatialEntry& entry, std::uint64_t epoch);
-  // Finds top_ again after a change.
-  void Settle();
+  // Bounds the node and what was changed below it.
+  static void Settle(Node& node);
   // The node, or a copy of it that this epoch may change.
   static Node& Own(std::shared_ptr<Node>& node, std::uint64_t epoch);
 
   std::shared_ptr<Node> root_;
   // The first node below the root that has not one child alone: contacts of
   // one sea share half a dozen nodes that tell them not apart. root_ keeps it.
+  // nullptr: there is none, or not settled.
   const Node* top_ = nullptr;
 };
 

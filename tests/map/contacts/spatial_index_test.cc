@@ -30,11 +30,13 @@ TEST(SpatialIndex, OneThatWasMovedFromIsEmptyAndCanBeFilledAgain) {
   here.oldest = here.newest = AtS(0);
   SpatialIndex index;
   index.Insert({.contact = &one, .code = 1, .bounds = here}, /*epoch=*/1);
+  index.Settle();
   SpatialIndex taken = std::move(index);
   EXPECT_EQ(Candidates(taken), std::vector<std::string>{"a"});
   // NOLINTNEXTLINE(bugprone-use-after-move): what it is about.
   EXPECT_TRUE(Candidates(index).empty());
   index.Insert({.contact = &other, .code = 1, .bounds = here}, /*epoch=*/2);
+  index.Settle();
   EXPECT_EQ(Candidates(index), std::vector<std::string>{"b"});
   EXPECT_EQ(Candidates(taken), std::vector<std::string>{"a"});
 }
