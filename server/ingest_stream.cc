@@ -61,10 +61,10 @@ absl::Status IngestStream<Kind>::TakeRequest() {
     RejectUnnumbered(status);
     return absl::OkStatus();
   };
-  if (!Kind::Has(request_)) {
+  if (!Kind::Has(*request_)) {
     return unnumbered(Missing(path, "one message"));
   }
-  const auto& message = Kind::Of(request_);
+  const auto& message = Kind::Of(*request_);
   if (epoch_ == 0) {
     // The first message names the source for the whole stream.
     FATHOM_RETURN_IF_ERROR(
@@ -277,7 +277,9 @@ void IngestStream<Kind>::Pump() {
       case Step::kNone:
         return;
       case Step::kRead:
-        this->StartRead(&request_);
+        arena_.Reset();
+        request_ = google::protobuf::Arena::CreateMessage<Request>(&arena_);
+        this->StartRead(request_);
         break;
       case Step::kWrite:
         this->StartWrite(&ack_);

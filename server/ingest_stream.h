@@ -15,6 +15,7 @@
 #ifndef FATHOM_SERVER_INGEST_STREAM_H_
 #define FATHOM_SERVER_INGEST_STREAM_H_
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -25,6 +26,7 @@
 #include "absl/status/status.h"
 #include "base/mutex.h"
 #include "fathom/v1/ingest_service.pb.h"
+#include "google/protobuf/arena.h"
 #include "grpcpp/support/server_callback.h"
 #include "server/call_registry.h"
 #include "server/convert_ingest.h"
@@ -115,8 +117,12 @@ class IngestStream final
   void FillAck() FATHOM_REQUIRES(mutex_);
 
   ServerContext& context_;
-  // Reader only: one read is under way at a time.
-  Request request_;
+  // Reader only: one read is under way at a time. The message and its parts lie
+  // in one block, which serves the next one again; larger ones get more.
+  static constexpr size_t kRequestBlockBytes = 4096;
+  alignas(8) std::array<char, kRequestBlockBytes> request_block_;
+  google::protobuf::Arena arena_{request_block_.data(), kRequestBlockBytes};
+  Request* request_ = nullptr;
   std::string source_id_;
   uint64_t epoch_ = 0;
   // Written only while no write is under way.

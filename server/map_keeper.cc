@@ -313,8 +313,8 @@ void MapKeeper::RunMapper() {
   std::vector<Command> commands;
   std::vector<Told> told;
   std::vector<std::function<void(const absl::Status&)>> applied;
+  std::vector<StorageItem> items;
   while (TakeCommands(commands)) {
-    std::vector<StorageItem> items;
     items.reserve(commands.size() + 1);
     size_t refused_commands = 0;
     bool any_record = false;
@@ -336,12 +336,13 @@ void MapKeeper::RunMapper() {
       }
       item.revision = map_->revision();
       if (item.record.has_value()) {
-        records_since_checkpoint_ += 1;
+        const bool report =
+            std::holds_alternative<storage::ContactRecord>(item.record->event);
+        (report ? reports_since_checkpoint_ : records_since_checkpoint_) += 1;
         any_record = true;
       }
       if (item.checkpoint != nullptr) {
-        records_since_checkpoint_ = 0;
-        checkpoint_revision_ = item.checkpoint->revision();
+        NoteCheckpoint(item.checkpoint->revision());
       }
       items.push_back(std::move(item));
     }
@@ -351,14 +352,12 @@ void MapKeeper::RunMapper() {
     // replayed without them it would give another map. So what is journalled
     // beside such tiles is committed in one transaction with them.
     const bool tiles_unsaved = unsaved_import_cells_ > 0 && any_record;
-    if (tiles_unsaved ||
-        records_since_checkpoint_ >= options_.journal_max_records) {
+    if (tiles_unsaved || CheckpointIsDue()) {
       StorageItem item;
       SaveAll(view, item);
       item.revision = view->revision();
       items.push_back(std::move(item));
-      records_since_checkpoint_ = 0;
-      checkpoint_revision_ = view->revision();
+      NoteCheckpoint(view->revision());
     }
     for (const Told& message : told) {
       message.listener->OnApplied(message.outcome);
@@ -370,16 +369,15 @@ void MapKeeper::RunMapper() {
       MutexLock lock(mutex_);
       pending_commands_ -= refused_commands;
     }
-    HandToStorage(std::move(items), /*last=*/false);
+    HandToStorage(items, /*last=*/false);
   }
-  std::vector<StorageItem> last;
   if (map_->revision() != checkpoint_revision_) {
     // A snapshot at the end makes the next start quick.
-    StorageItem& item = last.emplace_back();
+    StorageItem& item = items.emplace_back();
     SaveAll(Publish(), item);
     item.revision = map_->revision();
   }
-  HandToStorage(std::move(last), /*last=*/true);
+  HandToStorage(items, /*last=*/true);
 }
 
 MessageOutcome MapKeeper::ApplyMessage(IngestMessage& message,
@@ -525,13 +523,26 @@ absl::StatusOr<ImportedTile> MapKeeper::ApplyImport(
   return imported;
 }
 
-void MapKeeper::HandToStorage(std::vector<StorageItem> items, bool last) {
+bool MapKeeper::CheckpointIsDue() const {
+  return records_since_checkpoint_ +
+             reports_since_checkpoint_ / kReportsPerJournalRecord >=
+         options_.journal_max_records;
+}
+
+void MapKeeper::NoteCheckpoint(uint64_t revision) {
+  records_since_checkpoint_ = 0;
+  reports_since_checkpoint_ = 0;
+  checkpoint_revision_ = revision;
+}
+
+void MapKeeper::HandToStorage(std::vector<StorageItem>& items, bool last) {
   MutexLock lock(mutex_);
   if (to_store_.empty()) {
-    to_store_ = std::move(items);
+    to_store_.swap(items);
   } else {
     to_store_.insert(to_store_.end(), std::make_move_iterator(items.begin()),
                      std::make_move_iterator(items.end()));
+    items.clear();
   }
   if (last) mapper_ended_ = true;
   storage_changed_.NotifyOne();

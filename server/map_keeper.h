@@ -264,7 +264,14 @@ class MapKeeper {
   absl::StatusOr<ImportedTile> ApplyImport(const map::RasterBlock& block,
                                            bool last, const ImportTile& tile,
                                            StorageItem& item);
-  void HandToStorage(std::vector<StorageItem> items, bool last);
+  // Takes the items; `items` is then empty and keeps its memory, or has that of
+  // the last that the storage thread is done with.
+  void HandToStorage(std::vector<StorageItem>& items, bool last);
+
+  // So much is journalled that a snapshot is to cover it.
+  bool CheckpointIsDue() const;
+  // A snapshot covers all that was journalled up to the revision.
+  void NoteCheckpoint(uint64_t revision);
 
   // The storage thread.
   void RunStorage();
@@ -286,6 +293,8 @@ class MapKeeper {
   std::unique_ptr<map::ObstacleMap> map_;
   SourceLedger ledger_;
   size_t records_since_checkpoint_ = 0;
+  // Contact reports beside them.
+  size_t reports_since_checkpoint_ = 0;
   // Of tiles that no checkpoint holds yet: the last number of each import, and
   // their cells.
   std::map<std::string, uint64_t> unsaved_imports_;

@@ -62,6 +62,8 @@ class ByteWriter {
     bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
   }
 
+  // Room for so many bytes in all, if they are known before.
+  void Reserve(std::size_t size) { bytes_.reserve(size); }
   std::size_t size() const { return bytes_.size(); }
   const Bytes& bytes() const { return bytes_; }
   Bytes Take() { return std::move(bytes_); }

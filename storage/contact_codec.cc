@@ -209,6 +209,7 @@ absl::StatusOr<map::ContactEstimate> DecodeContactEstimate(
 
 Bytes EncodeContact(const map::StoredContact& contact) {
   ByteWriter rows;
+  rows.Reserve(contact.estimates.size() * kContactPointBytes);
   for (const map::ContactEstimate& estimate : contact.estimates) {
     PutContactPoint(estimate, rows);
   }

@@ -413,5 +413,16 @@ TEST_F(BoundedTest, MakesACheckpointBeforeTheJournalGrowsTooLong) {
   EXPECT_EQ(keeper_->storage_state().journal_records, 5U);
 }
 
+TEST_F(BoundedTest, TwoContactReportsCountAsOneRecordOfTheJournal) {
+  for (uint64_t sequence = 1; sequence <= 25; ++sequence) {
+    Submit(FixMessage(sequence, "m1"));
+    listener_->AwaitDurable(sequence);
+  }
+  size_t checkpoints = 0;
+  for (const SeenBatch& batch : store_.seen()) checkpoints += batch.checkpoint;
+  EXPECT_EQ(checkpoints, 1U);  // After 20 reports: 10 records.
+  EXPECT_EQ(keeper_->storage_state().journal_records, 5U);
+}
+
 }  // namespace
 }  // namespace fathom::server
