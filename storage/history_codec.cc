@@ -19,6 +19,21 @@ constexpr std::size_t kRowBytes = 8 + kContactPointBytes;
 
 }  // namespace
 
+std::vector<map::GeodeticPoint> PositionsOf(
+    std::span<const ContactHistoryRow> rows) {
+  std::vector<map::GeodeticPoint> positions;
+  positions.reserve(rows.size());
+  for (const ContactHistoryRow& row : rows) {
+    positions.push_back(row.estimate.Position());
+  }
+  return positions;
+}
+
+std::string WhatOfBlock(std::int64_t contact_number, std::int64_t block_id) {
+  return absl::StrFormat("contact_history block_id=%d of contact_number=%d",
+                         block_id, contact_number);
+}
+
 bool IsBefore(const ContactHistoryRow& a, const ContactHistoryRow& b) {
   return a.estimate.time != b.estimate.time ? a.estimate.time < b.estimate.time
                                             : a.revision < b.revision;
@@ -27,6 +42,7 @@ bool IsBefore(const ContactHistoryRow& a, const ContactHistoryRow& b) {
 Bytes EncodeHistory(std::int64_t contact_number,
                     std::span<const ContactHistoryRow> rows) {
   ByteWriter table;
+  table.Reserve(rows.size() * kRowBytes);
   ByteWriter names;
   std::size_t changes = 0;
   const std::vector<map::ContactKey> none;

@@ -7,10 +7,12 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "map/geodesy/points.h"
 #include "storage/bytes.h"
 #include "storage/mission_records.h"
 
@@ -34,6 +36,13 @@ Bytes EncodeHistory(std::int64_t contact_number,
 // another contact's, or not in order; UNIMPLEMENTED for a newer version.
 absl::StatusOr<std::vector<ContactHistoryRow>> DecodeHistory(
     ByteSpan blob, std::int64_t contact_number, std::string_view what);
+
+// Where each row is.
+std::vector<map::GeodeticPoint> PositionsOf(
+    std::span<const ContactHistoryRow> rows);
+
+// A block's name in errors.
+std::string WhatOfBlock(std::int64_t contact_number, std::int64_t block_id);
 
 // Order of a history: by time, at one time by revision.
 bool IsBefore(const ContactHistoryRow& a, const ContactHistoryRow& b);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "absl/strings/str_format.h"
 #include "base/status_macros.h"
 #include "storage/history_codec.h"
 
@@ -25,11 +24,9 @@ struct Box {
   }
 };
 
-Box BoxOf(std::span<const ContactHistoryRow> rows) {
+Box BoxOf(std::span<const map::GeodeticPoint> positions) {
   Box box;
-  for (const ContactHistoryRow& row : rows) {
-    box.Include(row.estimate.Position());
-  }
+  for (const map::GeodeticPoint& position : positions) box.Include(position);
   return box;
 }
 
@@ -39,16 +36,11 @@ double IndexSeconds(Time time) {
   return static_cast<double>(ToUnixMicros(time)) * 1e-6;
 }
 
-std::string WhatOf(std::int64_t contact_number, std::int64_t block_id) {
-  return absl::StrFormat("contact_history block_id=%d of contact_number=%d",
-                         block_id, contact_number);
-}
-
 absl::StatusOr<std::vector<ContactHistoryRow>> ReadBlock(
     Statement& read, std::int64_t contact_number, std::int64_t block_id) {
   read.BindInt(0, block_id);
   FATHOM_ASSIGN_OR_RETURN(const bool found, read.Step());
-  const std::string what = WhatOf(contact_number, block_id);
+  const std::string what = WhatOfBlock(contact_number, block_id);
   if (!found) {
     read.Reset();
     return absl::DataLossError(what + " is missing");
@@ -75,7 +67,7 @@ HistoryBlockMark MarkOf(std::span<const ContactHistoryRow> rows) {
 }
 
 absl::StatusOr<HistoryTable> HistoryTable::Create(Connection& connection) {
-  HistoryTable table;
+  HistoryTable table(connection);
   const auto prepare = [&connection](Statement& out,
                                      const char* sql) -> absl::Status {
     FATHOM_ASSIGN_OR_RETURN(out, connection.Prepare(sql));
@@ -199,7 +191,8 @@ absl::Status HistoryTable::Write(std::int64_t contact_number,
 
 absl::Status HistoryTable::Insert(std::int64_t contact_number,
                                   std::span<const ContactHistoryRow> rows) {
-  const Box box = BoxOf(rows);
+  const std::vector<map::GeodeticPoint> positions = PositionsOf(rows);
+  const Box box = BoxOf(positions);
   const HistoryBlockMark mark = MarkOf(rows);
   const Bytes content = EncodeHistory(contact_number, rows);
   insert_.BindInt(0, contact_number);
@@ -223,7 +216,8 @@ absl::Status HistoryTable::Insert(std::int64_t contact_number,
   total_.estimates += rows.size();
   total_.bytes += content.size();
   ++inserted_;
-  return insert_place_.Run();
+  FATHOM_RETURN_IF_ERROR(insert_place_.Run());
+  return features_.Insert(block_id, contact_number, rows, positions);
 }
 
 absl::Status HistoryTable::Delete(const Block& block) {
@@ -232,7 +226,8 @@ absl::Status HistoryTable::Delete(const Block& block) {
   delete_.BindInt(0, block.id);
   FATHOM_RETURN_IF_ERROR(delete_.Run());
   delete_place_.BindInt(0, block.id);
-  return delete_place_.Run();
+  FATHOM_RETURN_IF_ERROR(delete_place_.Run());
+  return features_.Delete(block.id);
 }
 
 absl::StatusOr<Time> HistoryTable::Newest() {
@@ -288,7 +283,7 @@ absl::StatusOr<std::uint64_t> HistoryTable::NewestRevision(
 
 absl::StatusOr<bool> HistoryTable::IsPlaced(
     std::int64_t block_id, std::span<const ContactHistoryRow> rows) {
-  const Box box = BoxOf(rows);
+  const Box box = BoxOf(PositionsOf(rows));
   place_.BindReal(0, box.south_deg);
   place_.BindReal(1, box.north_deg);
   place_.BindReal(2, box.west_deg);

@@ -1,5 +1,6 @@
 // The tables `contact_history`, its index by place and time, and
-// `contact_history_total`: blocks of what was believed of each contact.
+// `contact_history_total`: blocks of what was believed of each contact, and
+// with each what GDAL shows of it (history_features.h).
 // docs/storage_format.md says why blocks, and what each column means.
 //
 // A contact's blocks follow one another: no row of one lies between two of
@@ -18,6 +19,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "base/time.h"
+#include "storage/history_features.h"
 #include "storage/history_tail.h"
 #include "storage/mission_records.h"
 #include "storage/sqlite.h"
@@ -80,6 +82,8 @@ class HistoryTable {
   absl::Status ReloadTotal();
 
  private:
+  explicit HistoryTable(Connection& connection) : features_(connection) {}
+
   struct Block {
     std::int64_t id = 0;
     std::uint64_t estimates = 0;
@@ -94,6 +98,7 @@ class HistoryTable {
   // The time of the newest row; the earliest there is: there are none.
   absl::StatusOr<Time> Newest();
 
+  HistoryFeatures features_;
   HistoryTotal total_;
   // Blocks written since the last Forget.
   std::uint64_t inserted_ = 0;

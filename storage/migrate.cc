@@ -9,6 +9,7 @@
 #include "storage/contact_table.h"
 #include "storage/draft_file.h"
 #include "storage/history_codec.h"
+#include "storage/history_features.h"
 #include "storage/history_reader.h"
 #include "storage/history_table.h"
 #include "storage/mission_file.h"
@@ -36,8 +37,15 @@ absl::Status ToVersion6(Connection& connection) {
   return connection.CheckpointTruncate();
 }
 
-// To a history in blocks (history_table.h), in one transaction.
-absl::Status ToVersion7(Connection& connection) {
+absl::Status Damaged(const absl::Status& status) {
+  if (!absl::IsDataLoss(status)) return status;
+  return absl::DataLossError(absl::StrFormat(
+      "%s; `fathom mission repair OLD NEW` saves the rest", status.message()));
+}
+
+// From a history in rows to one in blocks (history_table.h), which come with
+// their features, in one transaction.
+absl::Status RowsToVersion8(Connection& connection) {
   FATHOM_ASSIGN_OR_RETURN(Transaction transaction,
                           Transaction::Begin(connection));
   FATHOM_RETURN_IF_ERROR(connection.Execute(
@@ -64,17 +72,22 @@ absl::Status ToVersion7(Connection& connection) {
       tail.Add(row);
       return absl::OkStatus();
     };
-    const auto damaged = [](const absl::Status& status) {
-      return absl::DataLossError(
-          absl::StrFormat("%s; `fathom mission repair OLD NEW` saves the rest",
-                          status.message()));
-    };
     FATHOM_RETURN_IF_ERROR(
-        ReadOldHistory(connection, "contact_history_6", take, damaged));
+        ReadOldHistory(connection, "contact_history_6", take, Damaged));
     FATHOM_RETURN_IF_ERROR(write());
   }
   FATHOM_RETURN_IF_ERROR(connection.Execute("DROP TABLE contact_history_6"));
-  FATHOM_RETURN_IF_ERROR(connection.Execute("PRAGMA user_version = 7"));
+  FATHOM_RETURN_IF_ERROR(connection.Execute("PRAGMA user_version = 8"));
+  return transaction.Commit();
+}
+
+// To blocks with features (history_features.h), in one transaction.
+absl::Status BlocksToVersion8(Connection& connection) {
+  FATHOM_ASSIGN_OR_RETURN(Transaction transaction,
+                          Transaction::Begin(connection));
+  FATHOM_RETURN_IF_ERROR(CreateFeatureTables(connection));
+  FATHOM_RETURN_IF_ERROR(Damaged(FillFeatureTables(connection)));
+  FATHOM_RETURN_IF_ERROR(connection.Execute("PRAGMA user_version = 8"));
   return transaction.Commit();
 }
 
@@ -86,8 +99,8 @@ absl::Status Migrate(const std::string& path, Connection& connection) {
   if (version == kSchemaVersion) return absl::OkStatus();
   FATHOM_RETURN_IF_ERROR(BackUp(path, version, connection));
   if (version < 6) FATHOM_RETURN_IF_ERROR(ToVersion6(connection));
-  if (version < 7) FATHOM_RETURN_IF_ERROR(ToVersion7(connection));
-  return absl::OkStatus();
+  return version < kFirstBlockVersion ? RowsToVersion8(connection)
+                                      : BlocksToVersion8(connection);
 }
 
 }  // namespace fathom::storage

@@ -11,6 +11,7 @@
 #include "absl/strings/str_format.h"
 #include "base/status_macros.h"
 #include "storage/checked_pages.h"
+#include "storage/history_features.h"
 #include "storage/mission_file.h"
 
 namespace fathom::storage {
@@ -244,7 +245,8 @@ absl::StatusOr<MissionMetadata> NormalMetadata(MissionMetadata metadata) {
 }
 
 absl::Status CreateHistoryTables(Connection& connection) {
-  return connection.Execute(kHistoryTables);
+  FATHOM_RETURN_IF_ERROR(connection.Execute(kHistoryTables));
+  return CreateFeatureTables(connection);
 }
 
 absl::Status CreateSchema(Connection& connection,

@@ -35,8 +35,8 @@ absl::StatusOr<MissionMetadata> NormalMetadata(MissionMetadata metadata);
 absl::Status CreateSchema(Connection& connection,
                           const MissionMetadata& metadata);
 
-// The tables of the contact history, empty (history_table.h): for a new mission
-// and for one of an older format.
+// The tables of the contact history, empty (history_table.h,
+// history_features.h): for a new mission and for one whose history is in rows.
 absl::Status CreateHistoryTables(Connection& connection);
 
 absl::StatusOr<MissionMetadata> ReadMetadata(Connection& connection);

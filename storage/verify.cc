@@ -7,6 +7,7 @@
 #include "absl/strings/str_format.h"
 #include "base/status_macros.h"
 #include "storage/history_codec.h"
+#include "storage/history_features.h"
 #include "storage/history_reader.h"
 #include "storage/history_replay.h"
 #include "storage/history_table.h"
@@ -89,11 +90,13 @@ class Prover {
         [this](const absl::Status& damage) { return Note(damage); }));
     FATHOM_ASSIGN_OR_RETURN(const std::int64_t version,
                             connection_.QueryInt("PRAGMA user_version"));
-    return version < kFirstBlockVersion ? absl::OkStatus() : CheckBlocks();
+    return version < kFirstBlockVersion
+               ? absl::OkStatus()
+               : CheckBlocks(version >= kFirstFeatureVersion);
   }
 
   // What the tables say of each block, and their own structure.
-  absl::Status CheckBlocks() {
+  absl::Status CheckBlocks(bool have_features) {
     FATHOM_ASSIGN_OR_RETURN(
         const std::int64_t index_ok,
         connection_.QueryInt(
@@ -107,6 +110,7 @@ class Prover {
             "(SELECT contact_number FROM contact) FROM contact_history"));
     FATHOM_ASSIGN_OR_RETURN(HistoryTable table,
                             HistoryTable::Create(connection_));
+    HistoryFeatures features(connection_);
     FATHOM_RETURN_IF_ERROR(table.ReloadTotal());
     HistoryTotal total = {.forgotten_estimates =
                               table.total().forgotten_estimates};
@@ -114,8 +118,7 @@ class Prover {
       FATHOM_ASSIGN_OR_RETURN(const bool more, select.Step());
       if (!more) break;
       const std::string what =
-          absl::StrFormat("contact_history block_id=%d contact_number=%d",
-                          select.ColumnInt(0), select.ColumnInt(1));
+          WhatOfBlock(select.ColumnInt(1), select.ColumnInt(0));
       total.estimates += select.ColumnUint(5);
       total.bytes += select.ColumnBlob(6).size();
       if (select.ColumnInt(7) == 0) Tell(what + ": its contact is missing");
@@ -134,6 +137,26 @@ class Prover {
       FATHOM_ASSIGN_OR_RETURN(const bool placed,
                               table.IsPlaced(select.ColumnInt(0), *rows));
       if (!placed) Tell(what + ": is not where the index says");
+      if (!have_features) continue;
+      const auto match =
+          features.Match(select.ColumnInt(0), select.ColumnInt(1), *rows);
+      if (!match.ok() || !*match) {
+        Tell(what + ": tracks or track_points say otherwise");
+      }
+      if (!match.ok()) FATHOM_RETURN_IF_ERROR(Note(match.status()));
+    }
+    if (have_features) {
+      FATHOM_ASSIGN_OR_RETURN(
+          const std::int64_t strangers,
+          connection_.QueryInt(
+              "SELECT (SELECT count(*) FROM tracks WHERE fid NOT IN (SELECT "
+              "block_id FROM contact_history)) + (SELECT count(*) FROM "
+              "track_points WHERE fid NOT IN (SELECT block_id FROM "
+              "contact_history))"));
+      if (strangers != 0) {
+        Tell(absl::StrFormat("tracks and track_points have %d rows of no block",
+                             strangers));
+      }
     }
     if (total != table.total()) {
       Tell("contact_history_total: the blocks hold another number");

@@ -3,14 +3,15 @@
 import hashlib
 import json
 import os
+import re
 import shutil
 import sqlite3
 import subprocess
 import unittest
 
 from live_server import (DEADLINE_S, FATHOM, FATHOMD, LiveTest, fix_report,
-                         import_chart, ping, report_contacts, send_pings,
-                         start_activity)
+                         import_chart, obstacle, ping, report_contacts,
+                         send_pings, start_activity)
 
 
 def run(*command):
@@ -144,6 +145,110 @@ class MissionFiles(LiveTest):
                          merged["map_digest"])
         self.assertEqual(self.verb("verify", self.path)["map_digest"],
                          self.digest)
+
+    def features(self, ogr2ogr, source, layer):
+        """{fid: (properties, coordinates)}, as GDAL reads them."""
+        done = run(ogr2ogr, "-f", "GeoJSON", "-lco", "COORDINATE_PRECISION=17",
+                   "-sql", f"SELECT *, fid + 0 AS number FROM {layer}",
+                   "/vsistdout/", source)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(done.stderr, "")
+        return {f["properties"]["number"]: (
+            f["properties"], f["geometry"] and f["geometry"]["coordinates"])
+                for f in json.loads(done.stdout)["features"]}
+
+    def test_the_mission_itself_opens_in_gdal(self):
+        ogrinfo, ogr2ogr = map(shutil.which, ("ogrinfo", "ogr2ogr"))
+        if ogrinfo is None or ogr2ogr is None:
+            self.skipTest("no ogrinfo (gdal-bin)")
+        path = self.folder / "gis.fathom"
+        with self.new_mission(name=path.name) as server:
+            # 300 in turn, one of them late; and one of another contact.
+            order = [i for i in range(1, 302) if i != 150]
+            order.insert(160, 150)
+            for at in range(0, len(order), 50):
+                report_contacts(server, [
+                    fix_report(number, 5 * i, 0, second=i, vn=5.0, ve=0.0)
+                    for number, i in enumerate(order[at:at + 50], at + 1)])
+            report_contacts(server, [
+                fix_report(302, 0, 200, second=301, contact="once")])
+            told = {name: [
+                (e.position.longitude_deg, e.position.latitude_deg, e.time)
+                for part in server.obstacle.GetContactHistory(
+                    obstacle.GetContactHistoryRequest(
+                        source_id="c4i", contact_id=name), timeout=DEADLINE_S)
+                for e in part.estimates] for name in ("ship", "once")}
+            self.assertEqual(len(told["ship"]), 301)
+            self.assertEqual(server.terminate(), 0)
+        before = hashlib.sha256(path.read_bytes()).hexdigest()
+        copy = self.folder / "gis.gpkg"
+        shutil.copyfile(path, copy)
+        quiet = ("--config", "GPKG_WARN_UNRECOGNIZED_APPLICATION_ID", "NO")
+        source = f"GPKG:{path}"
+        tracks = self.features(ogr2ogr, source, "tracks")
+        points = self.features(ogr2ogr, source, "track_points")
+        lines = [place for _, line in tracks.values() for place in line or ()]
+        for source in (copy, f"GPKG:{path}"):
+            with self.subTest(source):
+                layers = run(ogrinfo, "-ro", "-so", "-al", *quiet, source)
+                self.assertEqual(layers.returncode, 0, layers.stderr)
+                self.assertEqual(layers.stderr, "")
+                self.assertEqual(
+                    re.findall(r"Layer name: (\w+)", layers.stdout),
+                    ["tracks", "track_points", "contact"])
+                self.assertEqual(
+                    re.findall(r"Geometry: (.+)", layers.stdout),
+                    ["Line String", "Point", "None"])
+                extents = re.findall(
+                    r"Extent: \((.+), (.+)\) - \((.+), (.+)\)",
+                    layers.stdout)
+                for extent, places in zip(
+                        extents, (lines, [place for _, place in
+                                          points.values()]), strict=True):
+                    # Printed to 1e-6 degrees.
+                    for value, expected in zip(extent, (
+                            min(p[0] for p in places),
+                            min(p[1] for p in places),
+                            max(p[0] for p in places),
+                            max(p[1] for p in places))):
+                        self.assertAlmostEqual(float(value), expected,
+                                               delta=6e-7)
+        self.assertEqual(tracks.keys(), points.keys())
+        vertices = {"ship": [], "once": []}
+        for fid in sorted(tracks,
+                          key=lambda fid: tracks[fid][0]["start_time"]):
+            track, line = tracks[fid]
+            point, place = points[fid]
+            name = track["contact_id"]
+            # No line goes through one point.
+            line = line or [place]
+            self.assertEqual(len(line), track["estimates"])
+            self.assertEqual(line[-1], place)
+            first = len(vertices[name])
+            vertices[name] += line
+            for time, index in ((track["start_time"], first),
+                                (track["end_time"], first + len(line) - 1),
+                                (point["time"], first + len(line) - 1)):
+                self.assertEqual(time, told[name][index][2].ToJsonString())
+            self.assertEqual(point["contact_number"], track["contact_number"])
+        # Two blocks of 128 or more, or three; and one of the other contact.
+        self.assertGreaterEqual(len(tracks), 3)
+        self.assertIsNone(next(line for track, line in tracks.values()
+                               if track["contact_id"] == "once"))
+        for name, places in vertices.items():
+            self.assertEqual(len(places), len(told[name]))
+            for (lon, lat), expected in zip(places, told[name]):
+                self.assertAlmostEqual(lon, expected[0], delta=1e-9)
+                self.assertAlmostEqual(lat, expected[1], delta=1e-9)
+        # 5 m north a second, told by each report.
+        for point, _ in points.values():
+            if point["contact_id"] == "ship":
+                self.assertAlmostEqual(point["speed_m_s"], 5, delta=0.1)
+                self.assertLess(min(point["course_deg"],
+                                    360 - point["course_deg"]), 1)
+        # A mission that was closed stays as it is.
+        self.assertEqual(hashlib.sha256(path.read_bytes()).hexdigest(), before)
+        self.assertEqual(self.verb("verify", path)["sound"], "yes")
 
     def test_contact_history_opens_in_gdal_as_points_and_lines(self):
         out = self.folder / "tracks.gpkg"

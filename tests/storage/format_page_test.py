@@ -147,7 +147,7 @@ class FormatPage(unittest.TestCase):
         self.assertEqual(content[:16], b"SQLite format 3\0")
         self.assertEqual(content[20], 4)
         self.assertEqual(struct.unpack(">I", content[68:72])[0], 0x4674686D)
-        self.assertEqual(struct.unpack(">I", content[60:64])[0], 7)
+        self.assertEqual(struct.unpack(">I", content[60:64])[0], 8)
         for number in range(1, len(content) // PAGE + 1):
             page = content[(number - 1) * PAGE:number * PAGE]
             if any(page):
@@ -164,7 +164,7 @@ class FormatPage(unittest.TestCase):
 
     def test_tiles(self):
         leaves = 0
-        for key, blob in self.open("mission-v7.fathom").execute(
+        for key, blob in self.open("mission-v8.fathom").execute(
                 "SELECT tile_key, content FROM tile"):
             tile, _ = open_blob(blob, "T", (2,))
             self.assertEqual(tile.get("Q"), key)
@@ -187,7 +187,7 @@ class FormatPage(unittest.TestCase):
         self.assertGreater(leaves, 9)
 
     def test_activities_and_their_blocks(self):
-        database = self.open("mission-v7-closed.fathom")
+        database = self.open("mission-v8-closed.fathom")
         activities = {}
         for number, name, blob in database.execute(
                 "SELECT activity_number, activity_id, content FROM activity"):
@@ -225,7 +225,7 @@ class FormatPage(unittest.TestCase):
         self.assertEqual(touched, 9)
 
     def test_contacts_and_their_history(self):
-        database = self.open("mission-v7-closed.fathom")
+        database = self.open("mission-v8-closed.fathom")
         names = {}
         for number, source, contact, blob in database.execute(
                 "SELECT contact_number, source_id, contact_id, content FROM "
@@ -267,6 +267,61 @@ class FormatPage(unittest.TestCase):
             database.execute("SELECT estimate_count, forgotten_count FROM "
                              "contact_history_total").fetchall(), [(21, 0)])
 
+    def geometry(self, blob, kind):
+        """Longitudes and latitudes, all together."""
+        head = struct.unpack("<2sBBiBI", blob[:13])
+        self.assertEqual(head, (b"GP", 0, 1, 4326, 1, kind))
+        count, at = (1, 13) if kind == 1 else (
+            struct.unpack("<I", blob[13:17])[0], 17)
+        return struct.unpack(f"<{2 * count}d", blob[at:])
+
+    def test_features(self):
+        database = self.open("mission-v8-closed.fathom")
+        blocks = database.execute(
+            "SELECT block_id, contact_number, source_id, contact_id, "
+            "first_time_us, last_time_us, estimate_count, contact_history."
+            "content FROM contact_history JOIN contact USING (contact_number) "
+            "ORDER BY block_id").fetchall()
+
+        def text(time_us):
+            self.assertEqual(time_us % 1_000_000, 0)
+            return f"2026-01-01T00:00:{(time_us - START_US) // 1_000_000:02d}" \
+                ".000Z"
+        self.assertEqual(
+            database.execute(
+                "SELECT fid, contact_number, source_id, contact_id, "
+                "start_time, end_time, estimates FROM tracks ORDER BY fid"
+            ).fetchall(),
+            [(*b[:4], text(b[4]), text(b[5]), b[6]) for b in blocks])
+        lines = [self.geometry(blob, 2) for [blob] in
+                 database.execute("SELECT geom FROM tracks ORDER BY fid")]
+        self.assertEqual([len(line) / 2 for line in lines],
+                         [b[6] for b in blocks])
+        # tests/golden/make: every report 5 m further north than the one
+        # before, from 41.5 N, 71.4 W; a degree of latitude is 111.06 km there.
+        for line in lines:
+            self.assertAlmostEqual(line[0], -71.4, places=6)
+            self.assertLess(abs((line[3] - line[1]) * 111_060 - 10), 0.1)
+        points = database.execute(
+            "SELECT fid, contact_number, source_id, contact_id, time, status, "
+            "velocity_north_m_s, geom FROM track_points ORDER BY fid"
+        ).fetchall()
+        self.assertEqual([p[:5] for p in points],
+                         [(*b[:4], text(b[5])) for b in blocks])
+        for point, line, stored in zip(points, lines, blocks):
+            self.assertEqual(self.geometry(point[7], 1), line[-2:])
+            held, _ = open_blob(stored[7], "H", (1,))
+            held.get("q")
+            last = Reader(held.rows(held.varint(), 250)[-1])
+            last.get("Q")
+            last = last.point()
+            self.assertEqual(point[5:7], (last["status"], last["north_m_s"]))
+        self.assertEqual(
+            database.execute("SELECT table_name, data_type, srs_id FROM "
+                             "gpkg_contents ORDER BY table_name").fetchall(),
+            [("contact", "attributes", None),
+             ("track_points", "features", 4326), ("tracks", "features", 4326)])
+
     def journal_record(self, ids, rows, beams):
         """(kind, source or id, number, time) of the next."""
         kind, _ = rows.get("BQ")
@@ -295,7 +350,7 @@ class FormatPage(unittest.TestCase):
 
     def test_journal(self):
         found = []
-        for count, blob in self.open("mission-v7.fathom").execute(
+        for count, blob in self.open("mission-v8.fathom").execute(
                 "SELECT record_count, content FROM journal ORDER BY "
                 "segment_id"):
             segment, _ = open_blob(blob, "J", (1, 2))

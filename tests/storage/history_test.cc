@@ -30,6 +30,7 @@ namespace fathom::storage {
 namespace {
 
 using ::fathom::testing::IsOk;
+using ::fathom::testing::IsOkAndHolds;
 using ::fathom::testing::StatusIs;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -442,7 +443,7 @@ TEST_F(HistoryFileTest, RepairNeedsTheBlocksAlone) {
   ASSERT_THAT(file_->Close(), IsOk());
   file_.reset();
   for (const std::string page_of :
-       {"contact_history_total", "sqlite_autoindex_contact_1"}) {
+       {"contact_history_total", "sqlite_autoindex_contact_1", "tracks"}) {
     const std::string damaged = CopyWithDamage(path(), page_of);
     FATHOM_ASSERT_OK_AND_ASSIGN(const Repair repair,
                                 RepairMission(damaged, damaged + ".repaired"));
@@ -451,6 +452,69 @@ TEST_F(HistoryFileTest, RepairNeedsTheBlocksAlone) {
                                 MissionFile::Open(damaged + ".repaired"));
     ExpectKept(*mended);
     EXPECT_EQ(mended->Status().history.estimates, 1000u) << page_of;
+  }
+}
+
+// Contact "once" has one estimate: no line goes through that.
+TEST_F(HistoryFileTest, FeaturesThatSayOtherwiseAreToldAndRepaired) {
+  Report(SampleReport(0, "once"));
+  for (int i = 1; i <= 600; ++i) {
+    Report(SampleReport(i, "c" + std::to_string(i % 2)));
+    if (i % 100 == 0) Commit(false);
+  }
+  ASSERT_THAT(file_->Close(), IsOk());
+  file_.reset();
+  const auto problems = [](const std::string& of) {
+    return ProveFile(of)->problems;
+  };
+  ASSERT_THAT(problems(path()), IsEmpty());
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(
+        Connection connection,
+        Connection::Open(path(), Connection::Mode::kReadOnly));
+    EXPECT_THAT(connection.QueryInt("SELECT sum(estimates) FROM tracks"),
+                IsOkAndHolds(601));
+    // Their headers (17 bytes) and 16 bytes a vertex.
+    EXPECT_THAT(connection.QueryInt(
+                    "SELECT count(*) FROM tracks JOIN track_points "
+                    "USING (fid) WHERE CASE tracks.contact_id WHEN 'once' "
+                    "THEN tracks.geom IS NULL ELSE "
+                    "length(tracks.geom) = 17 + 16 * estimates END"),
+                IsOkAndHolds(*connection.QueryInt(
+                    "SELECT count(*) FROM contact_history")));
+  }
+  int number = 0;
+  for (const std::string change :
+       {"UPDATE tracks SET estimates = estimates + 1 WHERE fid = 2",
+        "UPDATE tracks SET start_time = end_time WHERE fid = 2",
+        "UPDATE tracks SET contact_id = 'x' WHERE fid = 2",
+        "UPDATE tracks SET geom = (SELECT geom FROM tracks WHERE fid = 3) "
+        "WHERE fid = 2",
+        "UPDATE tracks SET geom = NULL WHERE fid = 2",
+        "UPDATE track_points SET geom = (SELECT geom FROM track_points WHERE "
+        "fid = 3) WHERE fid = 2",
+        "UPDATE track_points SET status = 4 WHERE fid = 2",
+        "DELETE FROM track_points WHERE fid = 2",
+        "DELETE FROM tracks WHERE fid = 2",
+        "INSERT INTO track_points SELECT 1000, geom, contact_number, "
+        "source_id, contact_id, time, contact_class, status, "
+        "velocity_north_m_s, velocity_east_m_s, speed_m_s, course_deg, "
+        "std_north_m, std_east_m FROM track_points WHERE fid = 2"}) {
+    const std::string changed = path() + std::to_string(++number);
+    std::filesystem::copy_file(path(), changed);
+    {
+      FATHOM_ASSERT_OK_AND_ASSIGN(
+          Connection connection,
+          Connection::Open(changed, Connection::Mode::kReadWrite));
+      ASSERT_THAT(connection.Execute(change), IsOk());
+      ASSERT_THAT(connection.CheckpointTruncate(), IsOk());
+    }
+    EXPECT_THAT(problems(changed), ElementsAre(HasSubstr("track_points")))
+        << change;
+    FATHOM_ASSERT_OK_AND_ASSIGN(const Repair repair,
+                                RepairMission(changed, changed + ".repaired"));
+    EXPECT_EQ(repair.history_rows, 601u);
+    EXPECT_THAT(problems(changed + ".repaired"), IsEmpty()) << change;
   }
 }
 

@@ -14,6 +14,7 @@
 #include "storage/mission_file.h"
 #include "storage/offline.h"
 #include "storage/restore.h"
+#include "storage/sqlite.h"
 #include "tests/storage/temp_dir.h"
 #include "tests/testing/status_matchers.h"
 
@@ -21,7 +22,13 @@ namespace fathom::storage {
 namespace {
 
 using ::fathom::testing::IsOk;
+using ::fathom::testing::IsOkAndHolds;
+using ::fathom::testing::StatusIs;
+using ::testing::AnyOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 std::string ReadAll(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
@@ -92,16 +99,88 @@ TEST(Migrate, MissionOfVersion6IsBackedUpAndBroughtToThisOne) {
   EXPECT_EQ(ReadAll(path + ".v6.bak")[63], 6);
 }
 
+// Its history has no features. One copied while it was served, with a journal
+// and no block; one closed, with a block of each of two contacts.
+TEST(Migrate, MissionOfVersion7IsBackedUpAndBroughtToThisOne) {
+  for (const bool closed : {false, true}) {
+    const TempDir dir;
+    const std::string path = dir.File("m");
+    std::filesystem::copy_file(
+        closed ? FATHOM_SOURCE_DIR "/tests/golden/mission-v7-closed.fathom"
+               : FATHOM_SOURCE_DIR "/tests/golden/mission-v7.fathom",
+        path);
+    FATHOM_ASSERT_OK_AND_ASSIGN(const Proof as_it_was, ProveFile(path));
+    EXPECT_THAT(as_it_was.problems, IsEmpty());
+    EXPECT_EQ(as_it_was.history_rows, 21u);
+    EXPECT_EQ(ReadAll(path)[63], 7);
+    for (int time = 0; time < 2; ++time) {
+      FATHOM_ASSERT_OK_AND_ASSIGN(const auto file, MissionFile::Open(path));
+      ExpectGolden(*file);
+      if (time == 0) {
+        FATHOM_ASSERT_OK_AND_ASSIGN(
+            Connection connection,
+            Connection::Open(path, Connection::Mode::kReadOnly));
+        EXPECT_THAT(connection.QueryInt("SELECT count(*) FROM tracks"),
+                    IsOkAndHolds(closed ? 2 : 0));
+      }
+      ASSERT_THAT(file->Close(), IsOk());
+    }
+    EXPECT_EQ(ReadAll(path)[63], kSchemaVersion);
+    EXPECT_EQ(ReadAll(path + ".v7.bak")[63], 7);
+  }
+}
+
+// A block that cannot be read has no features and is told as before; the rest
+// is served, as it was in version 7.
+TEST(Migrate, DamagedBlockOfVersion7IsToldAndTheRestServed) {
+  const TempDir dir;
+  const std::string path = dir.File("m");
+  std::filesystem::copy_file(
+      FATHOM_SOURCE_DIR "/tests/golden/mission-v7-closed.fathom", path);
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(
+        Connection connection,
+        Connection::Open(path, Connection::Mode::kReadWrite));
+    ASSERT_THAT(connection.Execute("UPDATE contact_history SET content = "
+                                   "zeroblob(9) WHERE block_id = 1"),
+                IsOk());
+    ASSERT_THAT(connection.CheckpointTruncate(), IsOk());
+  }
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto file, MissionFile::Open(path));
+    ASSERT_THAT(file->Close(), IsOk());
+  }
+  EXPECT_EQ(ReadAll(path)[63], kSchemaVersion);
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(
+        Connection connection,
+        Connection::Open(path, Connection::Mode::kReadOnly));
+    EXPECT_THAT(connection.QueryInt("SELECT group_concat(fid) FROM tracks"),
+                IsOkAndHolds(2));
+  }
+  FATHOM_ASSERT_OK_AND_ASSIGN(const Proof damaged, ProveFile(path));
+  EXPECT_THAT(damaged.problems, Contains(HasSubstr("block_id=1 ")));
+  EXPECT_THAT(damaged.problems, Not(Contains(HasSubstr("block_id=2 "))));
+  FATHOM_ASSERT_OK_AND_ASSIGN(const Repair repaired,
+                              RepairMission(path, dir.File("repaired")));
+  EXPECT_EQ(repaired.left_out.size(), 1u);
+  // The other block: one contact has 10 estimates, the other 11.
+  EXPECT_THAT(repaired.history_rows, AnyOf(10u, 11u));
+  FATHOM_ASSERT_OK_AND_ASSIGN(const Proof proof,
+                              ProveFile(dir.File("repaired")));
+  EXPECT_THAT(proof.problems, IsEmpty());
+}
+
 // One copied while it was served, with a journal; one closed, with none.
-TEST(Migrate, MissionOfVersion7OpensAsItIs) {
-  for (const char* name : {"mission-v7.fathom", "mission-v7-closed.fathom"}) {
+TEST(Migrate, MissionOfVersion8OpensAsItIs) {
+  for (const char* name : {"mission-v8.fathom", "mission-v8-closed.fathom"}) {
     const TempDir dir;
     const std::string path = dir.File("m");
     std::filesystem::copy_file(
         std::string(FATHOM_SOURCE_DIR "/tests/golden/") + name, path);
     FATHOM_ASSERT_OK_AND_ASSIGN(const auto file, MissionFile::Open(path));
     ExpectGolden(*file);
-    EXPECT_FALSE(std::filesystem::exists(path + ".v7.bak"));
+    EXPECT_FALSE(std::filesystem::exists(path + ".v8.bak"));
   }
 }
 
