@@ -3,7 +3,11 @@
 // clients. One JSON document:
 //
 //   saturated_per_s   QueryObstacle with kUnderWay under way all the time
-//   rate_per_s        half of it: questions fall due at even intervals
+//   rate_per_s        half of it (--share): questions fall due at even
+//                     intervals
+//   busy_share        of all processors in that time, by /proc/stat: more than
+//                     half, for a question that comes alone pays for its own
+//                     wake-ups and at saturation one serves many
 //   p50_us p99_us worst_us  from when a question fell due to its answer. One
 //                     that is asked late, because the asking thread or the
 //                     server was late before, counts from when it fell due:
@@ -15,10 +19,12 @@
 #include <sys/prctl.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <fstream>
 #include <iostream>
 #include <map>
 #include <memory>
@@ -155,18 +161,41 @@ class Asker {
   std::vector<v1::QueryObstacleRequest> queries_;
 };
 
+// Of all processors together since the start, in ticks (proc(5), /proc/stat).
+struct ProcessorTime {
+  double busy = 0;
+  double all = 0;
+};
+ProcessorTime ReadProcessorTime() {
+  std::ifstream stat("/proc/stat");
+  std::string cpu;
+  stat >> cpu;
+  ProcessorTime time;
+  double ticks = 0;
+  // user nice system idle iowait irq softirq steal.
+  for (int field = 0; field < 8 && stat >> ticks; ++field) {
+    time.all += ticks;
+    if (field != 3 && field != 4) time.busy += ticks;
+  }
+  return time;
+}
+
 // The figures of one server, a value a window.
 class Figures {
  public:
-  absl::Status Measure(Asker& asker, double seconds) {
+  absl::Status Measure(Asker& asker, double share, double seconds) {
     FATHOM_ASSIGN_OR_RETURN(const double saturated,
                             asker.Saturate(seconds / 2));
+    const ProcessorTime before = ReadProcessorTime();
     FATHOM_ASSIGN_OR_RETURN(const std::vector<double> latencies_us,
-                            asker.AskEvenly(saturated / 2, seconds));
+                            asker.AskEvenly(share * saturated, seconds));
+    const ProcessorTime after = ReadProcessorTime();
     const double p50_us = Quantile(latencies_us, 0.5);
     const double p99_us = Quantile(latencies_us, 0.99);
     values_["saturated_per_s"].push_back(saturated);
-    values_["rate_per_s"].push_back(saturated / 2);
+    values_["rate_per_s"].push_back(share * saturated);
+    values_["busy_share"].push_back((after.busy - before.busy) /
+                                    std::max(1.0, after.all - before.all));
     values_["p50_us"].push_back(p50_us);
     values_["p99_us"].push_back(p99_us);
     values_["worst_us"].push_back(Quantile(latencies_us, 1));
@@ -187,7 +216,7 @@ class Figures {
 };
 
 absl::Status Run(const std::string& server, const std::string& null,
-                 int windows, double seconds) {
+                 int windows, double share, double seconds) {
   {
     FATHOM_ASSIGN_OR_RETURN(const auto client,
                             client::Client::Connect(server, {}));
@@ -201,8 +230,8 @@ absl::Status Run(const std::string& server, const std::string& null,
   Figures ours;
   Figures least;
   for (int window = 0; window < windows; ++window) {
-    FATHOM_RETURN_IF_ERROR(ours.Measure(fathom, seconds));
-    FATHOM_RETURN_IF_ERROR(least.Measure(floor, seconds));
+    FATHOM_RETURN_IF_ERROR(ours.Measure(fathom, share, seconds));
+    FATHOM_RETURN_IF_ERROR(least.Measure(floor, share, seconds));
   }
   std::cout << nlohmann::json{{"fathomd", ours.Report()},
                               {"null", least.Report()}}
@@ -216,18 +245,22 @@ int Main(int argc, char** argv) {
   std::string server;
   std::string null;
   int windows = 5;
+  double share = 0.5;
   double seconds = 4;
   app.add_option("--server", server, "fathomd, host:port")->required();
   app.add_option("--null", null, "fathom-null-server, host:port")->required();
   app.add_option("--windows", windows, "How many")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
+  app.add_option("--share", share, "Of the saturation rate, to ask at")
+      ->check(CLI::Range(0.01, 1.0))
+      ->capture_default_str();
   app.add_option("--seconds", seconds, "Of even questions in each window")
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   // Wakes when a question is due, not 50 us later.
   prctl(PR_SET_TIMERSLACK, 1UL, 0, 0, 0);
-  return ExitCode("open_loop", Run(server, null, windows, seconds));
+  return ExitCode("open_loop", Run(server, null, windows, share, seconds));
 }
 
 }  // namespace
