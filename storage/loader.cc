@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <limits>
 #include <optional>
 #include <set>
 #include <string>
@@ -99,6 +100,11 @@ absl::StatusOr<std::optional<std::int64_t>> NextTileKey(Connection& connection,
   return select.ColumnInt(0);
 }
 
+// Of inner pages that were changed: they lead back to rows before.
+absl::Status TilesOutOfOrder() {
+  return absl::DataLossError("they are not in the order of their keys");
+}
+
 // The tiles behind a page that cannot be read, from the last one backwards as
 // far as they can be. Behind `last`, in the order of their keys.
 absl::Status ReadFromTheEnd(Connection& connection, std::int64_t last,
@@ -109,13 +115,18 @@ absl::Status ReadFromTheEnd(Connection& connection, std::int64_t last,
                          "? ORDER BY tile_key DESC"));
   select.BindInt(0, last);
   const std::size_t before = rows.size();
+  std::int64_t above = std::numeric_limits<std::int64_t>::max();
   while (true) {
     const absl::StatusOr<bool> more = select.Step();
     if (!more.ok() && !absl::IsDataLoss(more.status())) return more.status();
     if (!more.ok() || !*more) break;
+    const std::int64_t key = select.ColumnInt(0);
+    if (key <= last || key >= above) break;
+    above = key;
     const ByteSpan blob = select.ColumnBlob(1);
-    rows.push_back({.key = map::TileKey::FromPacked(select.ColumnUint(0)),
-                    .blob = Bytes(blob.begin(), blob.end())});
+    rows.push_back(
+        {.key = map::TileKey::FromPacked(static_cast<std::uint64_t>(key)),
+         .blob = Bytes(blob.begin(), blob.end())});
   }
   std::reverse(rows.begin() + static_cast<std::ptrdiff_t>(before), rows.end());
   return absl::OkStatus();
@@ -133,6 +144,13 @@ absl::StatusOr<bool> ReadTileRows(Connection& connection, std::int64_t& last,
       connection.Prepare("SELECT tile_key, content FROM tile WHERE tile_key > "
                          "? ORDER BY tile_key"));
   select.BindInt(0, last);
+  const auto read_from_the_end =
+      [&](const absl::Status& why) -> absl::StatusOr<bool> {
+    harvest.damage.push_back(absl::StrFormat(
+        "tiles behind tile_key=%d cannot be read: %s", last, why.message()));
+    FATHOM_RETURN_IF_ERROR(ReadFromTheEnd(connection, last, rows));
+    return false;
+  };
   std::size_t bytes = 0;
   while (bytes < kTileChunkBytes) {
     const absl::StatusOr<bool> more = select.Step();
@@ -140,12 +158,9 @@ absl::StatusOr<bool> ReadTileRows(Connection& connection, std::int64_t& last,
       if (!absl::IsDataLoss(more.status())) return more.status();
       const auto key = NextTileKey(connection, last);
       if (!key.ok() || !key->has_value()) {
-        harvest.damage.push_back(
-            absl::StrFormat("tiles behind tile_key=%d cannot be read: %s", last,
-                            more.status().message()));
-        FATHOM_RETURN_IF_ERROR(ReadFromTheEnd(connection, last, rows));
-        return false;
+        return read_from_the_end(more.status());
       }
+      if (**key <= last) return read_from_the_end(TilesOutOfOrder());
       const auto tile =
           map::TileKey::FromPacked(static_cast<std::uint64_t>(**key));
       FATHOM_RETURN_IF_ERROR(harvest.Quarantine(
@@ -156,10 +171,7 @@ absl::StatusOr<bool> ReadTileRows(Connection& connection, std::int64_t& last,
     }
     if (!*more) return false;
     const std::int64_t key = select.ColumnInt(0);
-    if (key <= last) {
-      return absl::DataLossError(
-          "the tiles are not in the order of their keys");
-    }
+    if (key <= last) return read_from_the_end(TilesOutOfOrder());
     last = key;
     const auto tile = map::TileKey::FromPacked(static_cast<std::uint64_t>(key));
     const ByteSpan blob = select.ColumnBlob(1);

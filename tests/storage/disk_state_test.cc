@@ -7,12 +7,14 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <random>
 #include <string>
 
+#include "storage/checked_pages.h"
 #include "storage/mission_file.h"
 #include "storage/offline.h"
 #include "storage/restore.h"
@@ -28,6 +30,7 @@ namespace {
 using ::fathom::testing::IsOk;
 using ::fathom::testing::StatusIs;
 using ::testing::AllOf;
+using ::testing::Contains;
 using ::testing::HasSubstr;
 
 std::string ReadAll(const std::string& path) {
@@ -195,6 +198,77 @@ TEST(DamagedPage, IsNeverWrittenOverUnseen) {
                               MissionFile::Open(dir.File("repaired")));
   FATHOM_ASSERT_OK_AND_ASSIGN(Loaded whole, mended->Load());
   EXPECT_TRUE(whole.damage.empty());
+}
+
+// Big-endian, as SQLite writes them.
+std::size_t U32At(const std::string& file, std::size_t at) {
+  std::size_t value = 0;
+  for (int i = 0; i < 4; ++i) {
+    value = value << 8 | static_cast<std::uint8_t>(file[at++]);
+  }
+  return value;
+}
+
+// Found by fuzzing: a start that read the same tiles again and again. The inner
+// page's last pointer leads to its first leaf, whose first tile, in a damaged
+// page, is skipped: the reading went on behind it.
+TEST(DamagedPage, ThatLeadsBackEndsTheReading) {
+  constexpr std::size_t kPageBytes = 8192;
+  constexpr int kTiles = 100;
+  const TempDir dir;
+  const std::string path = dir.File("m");
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(const auto file,
+                                MissionFile::Create(path, SampleMetadata()));
+    ASSERT_THAT(file->Close(), IsOk());
+  }
+  std::int64_t root_page = 0;
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(
+        Connection connection,
+        Connection::Open(path, Connection::Mode::kReadWrite));
+    FATHOM_ASSERT_OK_AND_ASSIGN(
+        Statement insert,
+        connection.Prepare("INSERT INTO tile (tile_key, content) VALUES (?, "
+                           "?)"));
+    for (int i = 0; i < kTiles; ++i) {
+      insert.BindInt(0, 1000 + i);
+      insert.BindBlob(1, Bytes(20'000, static_cast<std::uint8_t>(i + 1)));
+      ASSERT_THAT(insert.Run(), IsOk());
+    }
+    FATHOM_ASSERT_OK_AND_ASSIGN(
+        root_page,
+        connection.QueryInt("SELECT rootpage FROM sqlite_schema WHERE name = "
+                            "'tile'"));
+    ASSERT_THAT(connection.CheckpointTruncate(), IsOk());
+  }
+  std::string content = ReadAll(path);
+  const std::size_t inner =
+      (static_cast<std::size_t>(root_page) - 1) * kPageBytes;
+  // sqlite.org/fileformat2.html 1.6: an interior page of a table; the pointer
+  // to its right-most child, and the place of its first cell, whose first
+  // field is a pointer.
+  ASSERT_EQ(content[inner], 5);
+  const std::size_t first_cell = U32At(content, inner + 12) >> 16;
+  const std::string first_leaf = content.substr(inner + first_cell, 4);
+  ASSERT_NE(content.substr(inner + 8, 4), first_leaf);
+  content.replace(inner + 8, 4, first_leaf);
+  const std::uint32_t sum = PageChecksum(
+      static_cast<std::uint32_t>(root_page),
+      ByteSpan(reinterpret_cast<const std::uint8_t*>(&content[inner]),
+               kPageBytes - kPageChecksumBytes));
+  for (std::size_t i = 0; i < 4; ++i) {
+    content[inner + kPageBytes - 4 + i] = static_cast<char>(sum >> (8 * i));
+  }
+  // What the first tile's row has in other pages.
+  const std::size_t damaged = content.find(std::string(4000, '\1'));
+  ASSERT_NE(damaged, std::string::npos);
+  content[damaged + 100] ^= 1;
+  std::ofstream(path, std::ios::binary) << content;
+
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto file, MissionFile::Open(path));
+  FATHOM_ASSERT_OK_AND_ASSIGN(const Loaded loaded, file->Load());
+  EXPECT_THAT(loaded.damage, Contains(HasSubstr("order of their keys")));
 }
 
 }  // namespace
