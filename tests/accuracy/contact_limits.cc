@@ -48,6 +48,18 @@ int CheckContactLimits(const nlohmann::json& report) {
             least_nis.Report() + ratio.Report() + bearing.Report() +
             told.Report();
 
+  // The same against the posterior's mean, which nobody is below.
+  Limit reached("contacts: rmse over per_axis, where 0.8 can be had", 0.8);
+  Limit optimal("contacts: elsewhere, over rmse of the posterior's mean", 1.05);
+  for (const auto& row : rows("contact_optimum")) {
+    if (row["optimal_ratio"] <= 0.8) {
+      reached.Offer(row["rmse_ratio"], Where(row));
+    } else {
+      optimal.Offer(row["over_optimal"], Where(row));
+    }
+  }
+  missed += reached.Report() + optimal.Report();
+
   Limit held("contacts: points off 50, 90, 99 %, 0 to 10 min ahead", 3);
   for (const auto& row : rows("contact_prediction")) {
     for (const int share : {50, 90, 99}) {

@@ -1,14 +1,18 @@
-// Consistency and prediction: ContactConsistencyFigures,
+// Consistency and prediction: ContactConsistencyFigures, ContactOptimumFigures,
 // ContactPredictionFigures.
 
 #include "tests/accuracy/contacts.h"
 
 #include <Eigen/LU>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
 #include <optional>
+#include <span>
+#include <utility>
 
+#include "tests/accuracy/contact_optimum.h"
 #include "tests/accuracy/contact_runs.h"
 
 namespace fathom::accuracy {
@@ -141,6 +145,56 @@ double ToldM(const Encounter& encounter) {
   return std::sqrt(square_m2 / kSets / kRuns / half);
 }
 
+// Root mean square errors of the position at the same instants of the same
+// runs, by both filters and by the mean of the posterior: no estimator's is
+// less but by chance.
+struct Optimum {
+  double optimal_rmse_m = 0;
+  double rmse_m = 0;
+  double per_axis_rmse_m = 0;
+  // The share of the posterior's variance that sampling added to the optimum's
+  // mean square error: the mean of 1 / effective_samples.
+  double sampling_share = 0;
+};
+
+Optimum MeasureOptimum(const Encounter& encounter) {
+  constexpr int kOptimumRuns = 300;
+  constexpr int kSamples = 1000;
+  // Of 61 reports: after three quarters and all.
+  constexpr std::array<std::size_t, 2> kInstants = {45, 60};
+  Optimum optimum;
+  const auto add = [&](const Eigen::Vector4d& error, double& to) {
+    to += error.head<2>().squaredNorm() / kOptimumRuns / kInstants.size();
+  };
+  for (std::uint64_t run = 1; run <= kOptimumRuns; ++run) {
+    const std::vector<Moment> moments = Run(encounter, run);
+    for (const auto& [filter, sum] :
+         {std::pair(map::FilterKind::kFourState, &optimum.rmse_m),
+          std::pair(map::FilterKind::kPerAxis, &optimum.per_axis_rmse_m)}) {
+      map::ContactMap map(map::ContactMapOptions{.filter = filter});
+      std::size_t next = 0;
+      for (const std::size_t instant : kInstants) {
+        while (next <= instant) (void)map.Apply(moments[next++].report);
+        const Moment& now = moments[instant];
+        add(ErrorOf(*map.View().At(now.report.key, now.report.time), now.truth),
+            *sum);
+      }
+    }
+    for (const std::size_t instant : kInstants) {
+      const PosteriorMean mean = MeanOfPosterior(
+          encounter, std::span(moments).first(instant + 1), kSamples, run);
+      add(mean.x - moments[instant].truth, optimum.optimal_rmse_m);
+      optimum.sampling_share +=
+          1 / mean.effective_samples / kOptimumRuns / kInstants.size();
+    }
+  }
+  for (double* square :
+       {&optimum.optimal_rmse_m, &optimum.rmse_m, &optimum.per_axis_rmse_m}) {
+    *square = std::sqrt(*square);
+  }
+  return optimum;
+}
+
 }  // namespace
 
 nlohmann::json ContactConsistencyFigures() {
@@ -166,6 +220,24 @@ nlohmann::json ContactConsistencyFigures() {
                     {"over_told", ours.rmse_m / told_m},
                     {"told_ratio", told_m / theirs.rmse_m},
                     {"bearing_std_deg", scene.encounter.bearing_std_deg}});
+  }
+  return rows;
+}
+
+nlohmann::json ContactOptimumFigures() {
+  auto rows = nlohmann::json::array();
+  for (const Scene& scene : Scenes()) {
+    const Optimum optimum = MeasureOptimum(scene.encounter);
+    rows.push_back(
+        {{"scene", scene.name},
+         {"optimal_rmse_m", optimum.optimal_rmse_m},
+         {"rmse_m", optimum.rmse_m},
+         {"per_axis_rmse_m", optimum.per_axis_rmse_m},
+         {"over_optimal", optimum.rmse_m / optimum.optimal_rmse_m},
+         {"rmse_ratio", optimum.rmse_m / optimum.per_axis_rmse_m},
+         {"optimal_ratio", optimum.optimal_rmse_m / optimum.per_axis_rmse_m},
+         {"sampling_share", optimum.sampling_share},
+         {"bearing_std_deg", scene.encounter.bearing_std_deg}});
   }
   return rows;
 }

@@ -15,6 +15,11 @@ namespace fathom::accuracy {
 // their chi-square bounds, rmse of the position of both filters, reports gated.
 nlohmann::json ContactConsistencyFigures();
 
+// 300 runs of the same, at two instants: rmse of the position of both filters
+// beside that of the posterior's mean (contact_optimum.h), which no estimator
+// can be below.
+nlohmann::json ContactOptimumFigures();
+
 // The same tracks foretold 0, 1, 5 and 10 minutes: the share of truths inside
 // the ellipse of 50, 90 and 99 %.
 nlohmann::json ContactPredictionFigures();

@@ -136,6 +136,7 @@ int Run(int argc, char** argv) {
           {"contact_reference",
            [&] { return ContactReferenceFigures(data + "/reference"); }},
           {"contact_consistency", ContactConsistencyFigures},
+          {"contact_optimum", ContactOptimumFigures},
           {"contact_prediction", ContactPredictionFigures},
           {"contact_thesis", ThesisContactFigures},
           {"contact_recorded",
