@@ -232,8 +232,10 @@ TEST(DamagedPage, ThatLeadsBackEndsTheReading) {
         connection.Prepare("INSERT INTO tile (tile_key, content) VALUES (?, "
                            "?)"));
     for (int i = 0; i < kTiles; ++i) {
+      // Not copied: it must be there when the statement runs.
+      const Bytes content(20'000, static_cast<std::uint8_t>(i + 1));
       insert.BindInt(0, 1000 + i);
-      insert.BindBlob(1, Bytes(20'000, static_cast<std::uint8_t>(i + 1)));
+      insert.BindBlob(1, content);
       ASSERT_THAT(insert.Run(), IsOk());
     }
     FATHOM_ASSERT_OK_AND_ASSIGN(
