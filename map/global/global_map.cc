@@ -29,8 +29,11 @@ absl::Status GlobalMapOptions::Validate() const {
 GlobalMap::GlobalMap(const GlobalMapOptions& options)
     : options_(options),
       tree_(std::make_unique<WorkTree>(
+          std::make_shared<TileMemory>(options.memory,
+                                       static_cast<float>(options.tolerance_m)),
           nullptr, TileLadder(options.root.max_level()), options.max_cells,
-          static_cast<float>(options.tolerance_m))) {}
+          static_cast<float>(options.tolerance_m))),
+      guard_(std::make_shared<const TileGuard>(tree_->memory())) {}
 
 GlobalMap::GlobalMap(GlobalMap&&) noexcept = default;
 GlobalMap& GlobalMap::operator=(GlobalMap&&) noexcept = default;
@@ -46,8 +49,18 @@ GlobalMap::ConglomerateSummary GlobalMap::Conglomerate(
 }
 
 GlobalMapView GlobalMap::View() {
-  return GlobalMapView(options_.root, tree_->Freeze(), tree_->tolerance_m());
+  const std::shared_ptr<const TileSlot>& root = tree_->Freeze();
+  if (tree_->memory()->Evict()) {
+    guard_ = std::make_shared<const TileGuard>(tree_->memory());
+  }
+  return GlobalMapView(options_.root, root, guard_, tree_->tolerance_m());
 }
+
+std::uint64_t GlobalMap::CountKnownLeaves() {
+  return tree_->Freeze()->totals().known_leaves;
+}
+
+bool GlobalMap::over_budget() const { return tree_->memory()->over_budget(); }
 
 std::uint64_t GlobalMap::leaf_count() const { return tree_->leaf_count(); }
 
@@ -74,15 +87,23 @@ absl::Status GlobalMap::FinishRestore() {
   restored_.clear();
   if (restored.empty()) return absl::OkStatus();
   // Keys are ordered by level first: backwards is children before parents.
-  std::map<TileKey, std::shared_ptr<const Tile>> built;
+  std::map<TileKey, std::shared_ptr<const TileSlot>> built;
+  const auto& memory = tree_->memory();
   for (auto it = restored.rbegin(); it != restored.rend(); ++it) {
     const TileKey& key = it->first;
-    if (it->second.tile != nullptr) {
-      built.emplace(key, std::move(it->second.tile));
+    RestoredTile& tile = it->second;
+    if (!tile.packed.empty()) {
+      built.emplace(key, std::make_shared<const TileSlot>(
+                             memory, key, tile.totals, std::move(tile.packed)));
       continue;
     }
-    const TileContent& content = it->second.content;
-    std::vector<std::shared_ptr<const Tile>> children;
+    if (tile.tile != nullptr) {
+      built.emplace(
+          key, std::make_shared<const TileSlot>(memory, std::move(tile.tile)));
+      continue;
+    }
+    const TileContent& content = tile.content;
+    std::vector<std::shared_ptr<const TileSlot>> children;
     std::uint32_t position = 0;
     for (std::size_t i = 0; i < content.levels.size(); ++i) {
       if (content.std_codes[i] == kChildCode) {
@@ -99,8 +120,10 @@ absl::Status GlobalMap::FinishRestore() {
       }
       position += SpanOf(content.levels[i]);
     }
-    built.emplace(key, Tile::FromContent(key, content, std::move(children),
-                                         tree_->tolerance_m()));
+    built.emplace(
+        key, std::make_shared<const TileSlot>(
+                 memory, Tile::FromContent(key, content, std::move(children),
+                                           tree_->tolerance_m())));
   }
   const auto root = built.find(TileKey{});
   if (root == built.end()) {
@@ -112,7 +135,7 @@ absl::Status GlobalMap::FinishRestore() {
         absl::StrFormat("tile level=%d row=%d col=%d hangs on no tile",
                         key.level, key.row, key.col));
   }
-  *tree_ = WorkTree(std::move(root->second), tree_->ladder(),
+  *tree_ = WorkTree(memory, std::move(root->second), tree_->ladder(),
                     options_.max_cells, tree_->tolerance_m());
   return absl::OkStatus();
 }

@@ -49,6 +49,7 @@
 #include "map/global/raster_block.h"
 #include "map/global/root_square.h"
 #include "map/global/tile.h"
+#include "map/global/tile_memory.h"
 
 namespace fathom::map {
 
@@ -61,6 +62,8 @@ struct GlobalMapOptions {
   // How far a merged mean may be from what it replaced, metres, > 0. Part of
   // the stored map: a map is opened with the tolerance it was made with.
   double tolerance_m = 0.5;
+  // What its tiles may take unpacked; not part of the stored map.
+  TileMemoryOptions memory = {};
 
   // Errors: INVALID_ARGUMENT: max_cells of 0, a tolerance that is not finite
   // and > 0, or a root that was not Create()d.
@@ -209,9 +212,17 @@ class GlobalMap {
   ConglomerateSummary Conglomerate(MergeRule rule = MergeRule::kRange,
                                    std::span<const LatticeBox> kept = {});
 
-  // Freezes what was written and returns the map as it is now. O(what was
-  // written since the last call).
+  // Freezes what was written, packs tiles if the budget of
+  // GlobalMapOptions::memory is passed, and returns the map as it is now.
+  // O(what was written or unpacked since the last call).
   GlobalMapView View();
+
+  // Freezes what was written. Leaves that hold a value.
+  std::uint64_t CountKnownLeaves();
+
+  // Whether readers have unpacked so much that View should be called for that
+  // alone, so that tiles are packed.
+  bool over_budget() const;
 
   // Leaves now, unknown ones too.
   std::uint64_t leaf_count() const;
@@ -241,6 +252,8 @@ class GlobalMap {
 
   GlobalMapOptions options_;
   std::unique_ptr<WorkTree> tree_;
+  // That of the views from now on.
+  std::shared_ptr<const TileGuard> guard_;
   std::map<TileKey, RestoredTile> restored_;
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <span>
 #include <vector>
 
 namespace fathom::map {
@@ -12,7 +13,7 @@ void VisitLeaves(
     const std::function<void(const CellKey&, const Leaf&)>& visit) {
   tile.ForEachSlot([&](std::uint32_t position, std::uint32_t slot, int level) {
     if (tile.IsChild(slot)) {
-      VisitLeaves(*tile.ChildAt(slot), visit);
+      VisitLeaves(*tile.ChildAt(slot)->Look(), visit);
     } else {
       visit(CellInTile(tile.key(), position, level), tile.LeafAt(slot));
     }
@@ -22,23 +23,16 @@ void VisitLeaves(
 void VisitTiles(const Tile& tile,
                 const std::function<void(const Tile&)>& visit) {
   visit(tile);
-  for (const auto& child : tile.children()) VisitTiles(*child, visit);
+  for (const auto& child : tile.children()) VisitTiles(*child->Look(), visit);
 }
 
 using LeafVisitor = absl::FunctionRef<void(const CellKey&, const Leaf&)>;
 using TileSkipper = absl::FunctionRef<bool(const TileTotals&)>;
 
-// The tile of which the cell is the root; null if there is none.
-const Tile* TileOf(const Tile& root, const CellKey& cell) {
-  const Tile* tile = &root;
-  while (tile != nullptr && tile->key().level < cell.level) {
-    tile = tile->Find(PositionInTile(cell, tile->key().level)).child;
-  }
-  return tile != nullptr && tile->key().level == cell.level ? tile : nullptr;
-}
-
-// The leaves of the cell that the box touches.
-void VisitLeavesIn(const Tile& root, int max_level, const CellKey& cell,
+// The leaves of the cell that the box touches. `slot`: the tile of which the
+// cell is the root or a part, or one above it. Opens no tile that is skipped or
+// that the box does not touch.
+void VisitLeavesIn(const TileSlot* slot, const CellKey& cell,
                    const LatticeBox& box, LeafVisitor visit, TileSkipper skip) {
   const int up = kMaxLevel - cell.level;
   const std::uint32_t row = cell.row << up;
@@ -48,23 +42,29 @@ void VisitLeavesIn(const Tile& root, int max_level, const CellKey& cell,
       col + last < box.col_first) {
     return;
   }
-  const Tile::Found found = Tile::Descend(root, row, col);
-  // No leaf is below kMaxLevel.
-  if (found.level <= cell.level || up == 0) {
-    const int down = cell.level - found.level;
-    visit({.level = static_cast<std::uint8_t>(found.level),
+  while (true) {
+    const int below = cell.level - slot->key().level;
+    if (below == 0) {
+      if (skip(slot->totals())) return;
+      if (slot->totals().leaves > 1) break;
+    }
+    const Tile::Found found =
+        slot->tile().Find(PositionInTile(cell, slot->key().level));
+    if (found.level > below) break;
+    if (found.child != nullptr) {
+      slot = found.child;
+      continue;
+    }
+    const int level = slot->key().level + found.level;
+    const int down = cell.level - level;
+    visit({.level = static_cast<std::uint8_t>(level),
            .row = cell.row >> down,
            .col = cell.col >> down},
           found.leaf);
     return;
   }
-  // Tiles begin at these levels (TileLadder) and at the top.
-  if ((max_level - cell.level) % kTileLevels == 0 || cell.level == 0) {
-    const Tile* const tile = TileOf(root, cell);
-    if (tile != nullptr && skip(tile->totals())) return;
-  }
   for (std::uint32_t quarter = 0; quarter < 4; ++quarter) {
-    VisitLeavesIn(root, max_level,
+    VisitLeavesIn(slot,
                   {.level = static_cast<std::uint8_t>(cell.level + 1),
                    .row = cell.row * 2 + quarter / 2,
                    .col = cell.col * 2 + quarter % 2},
@@ -74,24 +74,36 @@ void VisitLeavesIn(const Tile& root, int max_level, const CellKey& cell,
 
 using TileVisitor = std::function<void(const TileKey&, const Tile*)>;
 
-void VisitGone(const Tile& tile, const TileVisitor& visit) {
-  visit(tile.key(), nullptr);
-  for (const auto& child : tile.children()) VisitGone(*child, visit);
+using Children = std::span<const std::shared_ptr<const TileSlot>>;
+
+// None if there is no tile. Tiles with children are never packed.
+Children ChildrenOf(const TileSlot* slot) {
+  if (slot == nullptr || slot->totals().tiles == 1) return {};
+  return slot->tile().children();
 }
 
-void VisitDifferent(const Tile* old, const Tile& now,
+void VisitGone(const TileSlot& slot, const TileVisitor& visit) {
+  visit(slot.key(), nullptr);
+  for (const auto& child : ChildrenOf(&slot)) VisitGone(*child, visit);
+}
+
+void VisitDifferent(const TileSlot* old, const TileSlot& now,
                     const TileVisitor& visit) {
   if (old == &now) return;
-  if (old == nullptr || !old->SameSlots(now)) visit(now.key(), &now);
+  {
+    const TileLook tile = now.Look();
+    if (old == nullptr || !old->Look()->SameSlots(*tile)) {
+      visit(now.key(), &*tile);
+    }
+  }
   // Siblings are of one level and in Z-order in both tiles.
-  const auto z_order = [](const std::shared_ptr<const Tile>& tile) {
-    return ZOrder(tile->key().row & (kTileSide - 1),
-                  tile->key().col & (kTileSide - 1));
+  const auto z_order = [](const std::shared_ptr<const TileSlot>& slot) {
+    return ZOrder(slot->key().row & (kTileSide - 1),
+                  slot->key().col & (kTileSide - 1));
   };
-  std::span<const std::shared_ptr<const Tile>> before;
-  if (old != nullptr) before = old->children();
+  const Children before = ChildrenOf(old);
   std::size_t next = 0;
-  for (const std::shared_ptr<const Tile>& child : now.children()) {
+  for (const std::shared_ptr<const TileSlot>& child : ChildrenOf(&now)) {
     for (; next < before.size() && z_order(before[next]) < z_order(child);
          ++next) {
       VisitGone(*before[next], visit);
@@ -162,7 +174,7 @@ void GlobalMapView::ForEachLeafIn(const LatticeBox& box, LeafVisitor visit,
   const std::uint32_t differ =
       (box.row_first ^ box.row_last) | (box.col_first ^ box.col_last);
   const int up = static_cast<int>(std::bit_width(differ));
-  VisitLeavesIn(*root_tile_, root_.max_level(),
+  VisitLeavesIn(root_slot_.get(),
                 {.level = static_cast<std::uint8_t>(kMaxLevel - up),
                  .row = box.row_first >> up,
                  .col = box.col_first >> up},
@@ -180,22 +192,23 @@ std::optional<DepthBounds> GlobalMapView::Bounds(const CellKey& cell) const {
         std::min({bounds.shoalest_m, leaf.depth_m - residual_m, leaf.hazard_m});
     bounds.deepest_m = std::max(bounds.deepest_m, leaf.depth_m + residual_m);
   };
-  const auto add_tile = [&](const Tile& tile) {
-    bounds.shoalest_m = std::min(bounds.shoalest_m, tile.totals().shoalest_m);
-    bounds.deepest_m = std::max(bounds.deepest_m, tile.totals().deepest_m);
+  const auto add_tile = [&](const TileTotals& totals) {
+    bounds.shoalest_m = std::min(bounds.shoalest_m, totals.shoalest_m);
+    bounds.deepest_m = std::max(bounds.deepest_m, totals.deepest_m);
   };
 
-  const Tile* tile = root_tile_.get();
-  while (tile != nullptr) {
-    const int below = cell.level - tile->key().level;
+  const TileSlot* slot = root_slot_.get();
+  while (slot != nullptr) {
+    const int below = cell.level - slot->key().level;
     if (below == 0) {
-      add_tile(*tile);
+      add_tile(slot->totals());
       break;
     }
-    const std::uint32_t begin = PositionInTile(cell, tile->key().level);
-    const Tile::Found found = tile->Find(begin);
+    const Tile& tile = slot->tile();
+    const std::uint32_t begin = PositionInTile(cell, tile.key().level);
+    const Tile::Found found = tile.Find(begin);
     if (found.child != nullptr && below >= found.level) {
-      tile = found.child;
+      slot = found.child;
       continue;
     }
     if (found.level <= below) {
@@ -204,9 +217,9 @@ std::optional<DepthBounds> GlobalMapView::Bounds(const CellKey& cell) const {
     }
     // The cell is divided inside this tile.
     for (std::uint32_t p = begin; p < begin + SpanOf(below);) {
-      const Tile::Found part = tile->Find(p);
+      const Tile::Found part = tile.Find(p);
       if (part.child != nullptr) {
-        add_tile(*part.child);
+        add_tile(part.child->totals());
       } else {
         add_leaf(part.leaf);
       }
@@ -230,8 +243,8 @@ void GlobalMapView::ForEachTile(
 
 void DiffTiles(const GlobalMapView& old, const GlobalMapView& now,
                const std::function<void(const TileKey&, const Tile*)>& visit) {
-  if (now.root_tile() == nullptr) return;
-  VisitDifferent(old.root_tile().get(), *now.root_tile(), visit);
+  if (now.root_slot() == nullptr) return;
+  VisitDifferent(old.root_slot(), *now.root_slot(), visit);
 }
 
 }  // namespace fathom::map

@@ -1,10 +1,13 @@
 // GlobalMapView: the global map at one moment; what queries, storage and the
 // digest read.
 //
-// A view is a root square and the root tile of a tree that never changes. It
-// is copied at the cost of one reference count, stays valid whatever the
-// writer does, and any number of threads may use one view or copies of it. A
-// default-made view knows nothing.
+// A view is a root square, the root tile of a tree that never changes, and a
+// guard of the tiles that are read through it. It is copied at the cost of two
+// reference counts, stays valid whatever the writer does, and any number of
+// threads may use one view or copies of it. A default-made view knows nothing.
+//
+// A tile that is packed (tile_memory.h) is unpacked when it is read, some 0.1
+// ms; tiles that are evicted while a view is held are kept until it is gone.
 
 #ifndef FATHOM_MAP_GLOBAL_GLOBAL_MAP_VIEW_H_
 #define FATHOM_MAP_GLOBAL_GLOBAL_MAP_VIEW_H_
@@ -22,6 +25,7 @@
 #include "map/global/leaf.h"
 #include "map/global/root_square.h"
 #include "map/global/tile.h"
+#include "map/global/tile_memory.h"
 
 namespace fathom::map {
 
@@ -37,10 +41,13 @@ class GlobalMapView {
  public:
   GlobalMapView() = default;
   // For GlobalMap and for tests.
-  GlobalMapView(const RootSquare& root, std::shared_ptr<const Tile> root_tile,
-                float tolerance_m)
+  GlobalMapView(const RootSquare& root,
+                std::shared_ptr<const TileSlot> root_slot,
+                std::shared_ptr<const TileGuard> guard, float tolerance_m)
       : root_(root),
-        root_tile_(std::move(root_tile)),
+        guard_(std::move(guard)),
+        root_slot_(std::move(root_slot)),
+        root_tile_(&root_slot_->tile()),
         tolerance_m_(tolerance_m) {}
 
   // The leaf at a point: prior, measured or land, never smoothed. nullopt
@@ -85,12 +92,14 @@ class GlobalMapView {
   void ForEachLeaf(
       const std::function<void(const CellKey&, const Leaf&)>& visit) const;
 
-  // Calls visit(tile) for every tile, parents before children.
+  // Calls visit(tile) for every tile, parents before children; the tile is
+  // valid during the call.
   void ForEachTile(const std::function<void(const Tile&)>& visit) const;
 
   const RootSquare& root() const { return root_; }
   // Null only in a default-made view.
-  const std::shared_ptr<const Tile>& root_tile() const { return root_tile_; }
+  const Tile* root_tile() const { return root_tile_; }
+  const TileSlot* root_slot() const { return root_slot_.get(); }
   // What Leaf::residual_code is measured in (see GlobalMapOptions).
   float tolerance_m() const { return tolerance_m_; }
 
@@ -102,25 +111,48 @@ class GlobalMapView {
   std::uint64_t known_leaf_count() const {
     return root_tile_ ? root_tile_->totals().known_leaves : 0;
   }
-  // Memory of all tiles, allocator overhead estimated. O(1).
+  // What the map's tiles take now, those of other versions that somebody still
+  // holds too; allocator overhead estimated. All 0 in a default-made view and
+  // at rest. O(1), under a lock.
+  TileUse tile_use() const {
+    return guard_ ? guard_->memory().Use() : TileUse{};
+  }
+
+  // What this view's tiles take when all are unpacked, their slots included;
+  // allocator overhead estimated. O(1).
   std::uint64_t memory_bytes() const {
-    return root_tile_ ? root_tile_->totals().memory_bytes : 0;
+    if (root_tile_ == nullptr) return 0;
+    const TileTotals& totals = root_tile_->totals();
+    return totals.memory_bytes + totals.tiles * TileSlot::OwnBytes();
+  }
+
+  // The same tree without a guard: for who keeps a view for long to compare a
+  // later one with it, and should not keep what is evicted meanwhile. Only
+  // counts may be asked of it, and DiffTiles as `old`.
+  GlobalMapView AtRest() const {
+    GlobalMapView view = *this;
+    view.guard_.reset();
+    return view;
   }
 
  private:
   void Tell(const Leaf& leaf, int level, DepthEstimate& estimate) const;
 
   RootSquare root_;
-  std::shared_ptr<const Tile> root_tile_;
+  std::shared_ptr<const TileGuard> guard_;
+  std::shared_ptr<const TileSlot> root_slot_;
+  // That of the slot, which is never packed.
+  const Tile* root_tile_ = nullptr;
   float tolerance_m_ = 0;
 };
 
 // Calls visit(key, tile) for each tile of `now` whose own slots differ from
 // those of the same key in `old` (parents before children, siblings in
-// Z-order), and visit(key, nullptr) for each tile that is gone. Tiles that the
-// views share are not opened: the cost is that of what changed. A parent of a
-// changed tile is visited only if its own slots changed.
-// REQUIRES: both views are of one map; `old` may be default-made.
+// Z-order; the tile is valid during the call), and visit(key, nullptr) for each
+// tile that is gone. Tiles that the views share are not opened: the cost is
+// that of what changed. A parent of a changed tile is visited only if its own
+// slots changed.
+// REQUIRES: both views are of one map; `old` may be default-made or at rest.
 void DiffTiles(const GlobalMapView& old, const GlobalMapView& now,
                const std::function<void(const TileKey&, const Tile*)>& visit);
 

@@ -11,6 +11,7 @@
 
 #include "absl/base/macros.h"
 #include "absl/strings/str_format.h"
+#include "map/global/tile_memory.h"
 
 namespace fathom::map {
 namespace {
@@ -29,7 +30,6 @@ constexpr std::uint32_t kShortTimeMask = 0xffffff;
 
 // What an allocator adds to a block of memory, near enough.
 constexpr std::size_t kAllocationBytes = 16;
-constexpr std::size_t kControlBytes = 24;
 
 // Bits 0..n of a word. REQUIRES: n < 64.
 constexpr std::uint64_t UpTo(unsigned n) {
@@ -85,10 +85,10 @@ struct Tile::Rank {
   }
 };
 
-std::shared_ptr<const Tile> Tile::Build(
+std::unique_ptr<const Tile> Tile::Build(
     const TileKey& key, std::span<const std::uint8_t> levels,
     std::span<const Leaf> leaves,
-    std::vector<std::shared_ptr<const Tile>> children, float tolerance_m) {
+    std::vector<std::shared_ptr<const TileSlot>> children, float tolerance_m) {
   // The shape.
   std::uint64_t whole = 0;
   std::uint64_t divided = 0;
@@ -156,7 +156,7 @@ std::shared_ptr<const Tile> Tile::Build(
       children.size() * sizeof(Child) + (block_count + 1) * kBlockBytes +
       slots * (record_bytes + (residuals ? 1u : 0u) + (spreads ? 1u : 0u)) +
       hazards * kHazardBytes + 1;
-  std::shared_ptr<Tile> tile(new (bytes_behind) Tile(key));
+  std::unique_ptr<Tile> tile(new (bytes_behind) Tile(key));
   tile->whole_ = whole;
   tile->divided_ = divided;
   tile->slot_count_ = static_cast<std::uint16_t>(slots);
@@ -231,13 +231,15 @@ std::shared_ptr<const Tile> Tile::Build(
 
 Tile::~Tile() { std::destroy_n(const_cast<Child*>(Children()), child_count_); }
 
+std::uint64_t Tile::memory_bytes() const {
+  return blocks_at_ + ByteCount() + 1 + kAllocationBytes;
+}
+
 void Tile::AddChildren() {
   TileTotals& totals = totals_;
   totals.tiles = 1;
-  // The tile and the reference count, each an allocation.
-  totals.memory_bytes = blocks_at_ + ByteCount() + 1 + kAllocationBytes +
-                        kControlBytes + kAllocationBytes;
-  for (const std::shared_ptr<const Tile>& child : this->children()) {
+  totals.memory_bytes = memory_bytes();
+  for (const std::shared_ptr<const TileSlot>& child : this->children()) {
     const TileTotals& below = child->totals();
     totals.tiles += below.tiles;
     totals.leaves += below.leaves;
@@ -349,7 +351,7 @@ Tile::Found Tile::Descend(const Tile& root, std::uint32_t row,
       return found;
     }
     shift = tile->child_shift_;
-    tile = tile->Children()[tile->ChildIndex(record)].get();
+    tile = &tile->Children()[tile->ChildIndex(record)]->tile();
   }
 }
 
@@ -378,7 +380,7 @@ bool Tile::IsChild(std::uint32_t slot) const {
   return LoadAs<std::uint16_t>(Record(slot) + 4) == kChildCode;
 }
 
-const std::shared_ptr<const Tile>& Tile::ChildAt(std::uint32_t slot) const {
+const std::shared_ptr<const TileSlot>& Tile::ChildAt(std::uint32_t slot) const {
   return Children()[ChildIndex(Record(slot))];
 }
 
@@ -393,9 +395,9 @@ bool Tile::SameSlots(const Tile& other) const {
          std::memcmp(Block(0), other.Block(0), ByteCount()) == 0;
 }
 
-std::shared_ptr<const Tile> Tile::FromContent(
+std::unique_ptr<const Tile> Tile::FromContent(
     const TileKey& key, const TileContent& content,
-    std::vector<std::shared_ptr<const Tile>> children, float tolerance_m) {
+    std::vector<std::shared_ptr<const TileSlot>> children, float tolerance_m) {
   std::vector<Leaf> leaves(content.levels.size());
   for (std::size_t i = 0; i < leaves.size(); ++i) {
     leaves[i].depth_m = content.depths_m[i];

@@ -21,12 +21,11 @@
 //
 // A slot of the finest size that the tile spans (TileLadder::LevelsOf) may hold
 // a whole tile in place of a leaf; so does the tree reach from level 0 to 24 in
-// four tiles. Tiles are shared between
-// the writer and all views (shared_ptr: a tile lives as long as any of them
-// knows it), and two views that share a tile are equal there.
+// four tiles. It hangs there in a TileSlot (tile_memory.h), which the writer
+// and all views that have the tile share; two views that share a slot are equal
+// there.
 //
-// Thread safety: immutable, except settled() which only the map's writer reads
-// and sets.
+// Thread safety: immutable.
 
 #ifndef FATHOM_MAP_GLOBAL_TILE_H_
 #define FATHOM_MAP_GLOBAL_TILE_H_
@@ -37,6 +36,7 @@
 #include <memory>
 #include <new>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -77,7 +77,9 @@ struct TileTotals {
   std::uint64_t leaves = 0;        // Unknown ones too.
   std::uint64_t known_leaves = 0;  // Prior, measured and land.
   std::uint64_t tiles = 0;
-  std::uint64_t memory_bytes = 0;  // With allocator overhead (16 B a block).
+  // Of the tiles unpacked, without their slots; with allocator overhead (16 B
+  // a block).
+  std::uint64_t memory_bytes = 0;
   // Least and greatest depth that any known leaf stands for, its residual
   // included, the least its hazard too; +inf and -inf if none is known.
   // Uncertainty is not included.
@@ -97,13 +99,18 @@ struct TileTotals {
   }
 };
 
+class TileSlot;
+
+// A tile's content as its codec's bytes (see TileCodec).
+using PackedTile = std::vector<std::uint8_t>;
+
 class Tile {
  public:
   // What lies at a position.
   struct Found {
     Leaf leaf;
     int level = 0;
-    const Tile* child = nullptr;  // Not null: the leaf says nothing.
+    const TileSlot* child = nullptr;  // Not null: the leaf says nothing.
   };
 
   // Builds a tile from its slots in Z-order: levels[i] below the root and
@@ -111,16 +118,16 @@ class Tile {
   // `children`. `tolerance_m` is the map's: what residual codes are measured
   // in. REQUIRES: the levels cover the tile exactly, as many child slots as
   // children, keys that agree.
-  static std::shared_ptr<const Tile> Build(
+  static std::unique_ptr<const Tile> Build(
       const TileKey& key, std::span<const std::uint8_t> levels,
       std::span<const Leaf> leaves,
-      std::vector<std::shared_ptr<const Tile>> children, float tolerance_m);
+      std::vector<std::shared_ptr<const TileSlot>> children, float tolerance_m);
 
   // The tile of a content as Content() gave it. REQUIRES: ValidateContent is
   // OK; as many children as there are child slots, in Z-order.
-  static std::shared_ptr<const Tile> FromContent(
+  static std::unique_ptr<const Tile> FromContent(
       const TileKey& key, const TileContent& content,
-      std::vector<std::shared_ptr<const Tile>> children, float tolerance_m);
+      std::vector<std::shared_ptr<const TileSlot>> children, float tolerance_m);
 
   ~Tile();
   static void operator delete(void* tile) { ::operator delete(tile); }
@@ -136,8 +143,9 @@ class Tile {
   Found Find(std::uint32_t position) const;
 
   // The leaf that covers a cell of the lattice of kMaxLevel in the tree below
-  // `root`; `level` is then that of the leaf from the top. REQUIRES: root is
-  // of level 0. About 10 ns a tile that is in cache.
+  // `root`; `level` is then that of the leaf from the top. Unpacks the tiles on
+  // its way: see TileSlot::tile for what the caller holds. REQUIRES: root is of
+  // level 0. About 10 ns a tile that is in cache.
   static Found Descend(const Tile& root, std::uint32_t row, std::uint32_t col);
 
   // Calls visit(position, slot index, level) for each slot in Z-order.
@@ -148,14 +156,17 @@ class Tile {
   Leaf LeafAt(std::uint32_t slot) const;
   bool IsChild(std::uint32_t slot) const;
   // The child tile of a slot. REQUIRES: IsChild(slot).
-  const std::shared_ptr<const Tile>& ChildAt(std::uint32_t slot) const;
+  const std::shared_ptr<const TileSlot>& ChildAt(std::uint32_t slot) const;
 
   // Child tiles in Z-order.
-  std::span<const std::shared_ptr<const Tile>> children() const {
+  std::span<const std::shared_ptr<const TileSlot>> children() const {
     return {Children(), child_count_};
   }
 
   const TileTotals& totals() const { return totals_; }
+
+  // Of this tile alone, with the allocator's overhead.
+  std::uint64_t memory_bytes() const;
 
   // Whether both have the same slots and leaves; children are compared by
   // place, not by what is in them.
@@ -163,11 +174,6 @@ class Tile {
 
   // The plain arrays. O(slots).
   TileContent Content() const;
-
-  // Whether conglomerating this tile and all below it changes nothing. Only
-  // for the writer of the map; false is always right.
-  bool settled() const { return settled_; }
-  void set_settled(bool settled) const { settled_ = settled; }
 
  private:
   // The tile is one allocation: this object, and behind it
@@ -211,7 +217,7 @@ class Tile {
   // The fields of a slot that lie behind its record.
   void LoadRest(std::uint32_t slot, Leaf& leaf) const;
 
-  using Child = std::shared_ptr<const Tile>;
+  using Child = std::shared_ptr<const TileSlot>;
   const Child* Children() const {
     return reinterpret_cast<const Child*>(this + 1);
   }
@@ -251,7 +257,6 @@ class Tile {
   std::uint8_t record_bytes_ = kRecordBytes;
   bool has_residuals_ = false;
   bool has_spreads_ = false;
-  mutable bool settled_ = false;
   // Where in a lattice index the position within a child begins: known before
   // the child is read, so that Descend does not wait for it (15 ns).
   std::uint8_t child_shift_ = 0;
@@ -275,14 +280,27 @@ absl::Status ValidateContent(const TileKey& key, const TileContent& content,
 // which is pure: a loader may call it on many threads.
 struct RestoredTile {
   TileKey key;
-  // Null: it has children, and `content` is kept until they are there.
-  std::shared_ptr<const Tile> tile = nullptr;
+  // Null: it is packed, or it has children.
+  std::unique_ptr<const Tile> tile = nullptr;
+  // Of a tile with children, until they are there.
   TileContent content = {};
+  // Of a packed one: its totals and the bytes that Make's content was read
+  // from.
+  TileTotals totals = {};
+  PackedTile packed = {};
 
   // Errors: those of ValidateContent. About 15 ns a slot.
   static absl::StatusOr<RestoredTile> Make(const TileKey& key,
                                            TileContent content, int max_level,
                                            float tolerance_m);
+
+  // Keeps the bytes in the place of the tile. REQUIRES: `tile` is there, and
+  // its content is what the map's codec unpacks from `bytes`.
+  void Pack(PackedTile bytes) {
+    totals = tile->totals();
+    packed = std::move(bytes);
+    tile.reset();
+  }
 };
 
 template <typename Visitor>

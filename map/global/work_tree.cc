@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <span>
 #include <utility>
 
 #include "absl/base/macros.h"
@@ -30,7 +31,7 @@ WorkTile::WorkTile(const Tile& tile) : key(tile.key()) {
     if (tile.IsChild(slot)) leaves[position].time_s = next_child++;
   });
   children.reserve(tile.children().size());
-  for (const std::shared_ptr<const Tile>& child : tile.children()) {
+  for (const std::shared_ptr<const TileSlot>& child : tile.children()) {
     children.push_back({.frozen = child, .work = nullptr});
   }
 }
@@ -73,22 +74,27 @@ void WorkTile::RemoveChild(std::uint32_t start, const Leaf& leaf) {
   modified = true;
 }
 
-WorkTree::WorkTree(std::shared_ptr<const Tile> root_tile, TileLadder ladder,
+WorkTree::WorkTree(std::shared_ptr<TileMemory> memory,
+                   std::shared_ptr<const TileSlot> root, TileLadder ladder,
                    std::uint64_t max_cells, float tolerance_m)
-    : ladder_(ladder), max_cells_(max_cells), tolerance_m_(tolerance_m) {
-  if (root_tile == nullptr) {
+    : memory_(std::move(memory)),
+      ladder_(ladder),
+      max_cells_(max_cells),
+      tolerance_m_(tolerance_m) {
+  if (root == nullptr) {
     const std::uint8_t level = 0;
     const Leaf unknown;
-    root_tile =
-        Tile::Build(TileKey{}, {&level, 1}, {&unknown, 1}, {}, tolerance_m);
+    root = std::make_shared<const TileSlot>(
+        memory_,
+        Tile::Build(TileKey{}, {&level, 1}, {&unknown, 1}, {}, tolerance_m));
   }
-  leaf_count_ = root_tile->totals().leaves;
-  root_.frozen = std::move(root_tile);
+  leaf_count_ = root->totals().leaves;
+  root_.frozen = std::move(root);
 }
 
 WorkTile& WorkTree::Open(WorkNode& node) {
   if (node.work == nullptr) {
-    node.work = std::make_unique<WorkTile>(*node.frozen);
+    node.work = std::make_unique<WorkTile>(*node.frozen->Look());
     ++open_tiles_;
   }
   return *node.work;
@@ -119,7 +125,7 @@ WorkTile& WorkTree::DivideIntoChild(WorkTile& tile, std::uint32_t start) {
   return child;
 }
 
-const std::shared_ptr<const Tile>& WorkTree::Freeze() {
+const std::shared_ptr<const TileSlot>& WorkTree::Freeze() {
   FreezeNode(root_);
   return root_.frozen;
 }
@@ -130,7 +136,7 @@ void WorkTree::FreezeNode(WorkNode& node) {
   // Children first: the arrays below are shared by all levels.
   for (WorkNode& child : work.children) FreezeNode(child);
 
-  std::vector<std::shared_ptr<const Tile>> children;
+  std::vector<std::shared_ptr<const TileSlot>> children;
   frozen_levels_.clear();
   frozen_leaves_.clear();
   for (std::uint32_t position = 0; position < kTileCells;) {
@@ -143,17 +149,22 @@ void WorkTree::FreezeNode(WorkNode& node) {
     position += SpanOf(level);
   }
 
-  const bool same_children =
-      node.frozen != nullptr && std::equal(children.begin(), children.end(),
-                                           node.frozen->children().begin(),
-                                           node.frozen->children().end());
+  bool same_children = node.frozen != nullptr;
+  if (same_children) {
+    // A tile with children is never packed.
+    std::span<const std::shared_ptr<const TileSlot>> before;
+    if (node.frozen->totals().tiles > 1) {
+      before = node.frozen->tile().children();
+    }
+    same_children = std::equal(children.begin(), children.end(), before.begin(),
+                               before.end());
+  }
   if (!same_children || work.modified) {
-    std::shared_ptr<const Tile> tile =
+    std::unique_ptr<const Tile> tile =
         Tile::Build(work.key, frozen_levels_, frozen_leaves_,
                     std::move(children), tolerance_m_);
-    if (!same_children || !tile->SameSlots(*node.frozen)) {
-      node.frozen = std::move(tile);
-      node.frozen->set_settled(false);
+    if (!same_children || !tile->SameSlots(*node.frozen->Look())) {
+      node.frozen = std::make_shared<const TileSlot>(memory_, std::move(tile));
     }
   }
   if (work.settled) node.frozen->set_settled(true);

@@ -6,7 +6,8 @@
 // four copies. Freeze() turns all open tiles into immutable ones again; one
 // whose slots and children ended as they began keeps its identity.
 //
-// Open tiles take 53 KB each; FreezeIfLarge() bounds them. Not thread-safe.
+// What is packed is unpacked for the expansion only. Open tiles take 53 KB
+// each; FreezeIfLarge() bounds them. Not thread-safe.
 
 #ifndef FATHOM_MAP_GLOBAL_WORK_TREE_H_
 #define FATHOM_MAP_GLOBAL_WORK_TREE_H_
@@ -19,6 +20,7 @@
 #include "map/global/cell_key.h"
 #include "map/global/leaf.h"
 #include "map/global/tile.h"
+#include "map/global/tile_memory.h"
 
 namespace fathom::map {
 
@@ -27,7 +29,7 @@ struct WorkTile;
 // A place in the tree that holds a tile: frozen, open, or open over the frozen
 // one from which it was expanded. Never empty once in the tree.
 struct WorkNode {
-  std::shared_ptr<const Tile> frozen;
+  std::shared_ptr<const TileSlot> frozen;
   std::unique_ptr<WorkTile> work;
 
   // REQUIRES: one of the two is there.
@@ -38,7 +40,7 @@ struct WorkTile {
   TileKey key;
   // Whether slots were changed since the tile was expanded.
   bool modified = false;
-  // See Tile::settled().
+  // See TileSlot::settled().
   bool settled = false;
   // Levels below the root of the slot that covers each position.
   std::array<std::uint8_t, kTileCells> levels;
@@ -83,10 +85,13 @@ class WorkTree {
   // Open tiles before FreezeIfLarge() acts: 54 MB.
   static constexpr std::size_t kMaxOpenTiles = 1024;
 
-  // REQUIRES: `root_tile` is a level 0 tile, or null: one unknown leaf.
-  WorkTree(std::shared_ptr<const Tile> root_tile, TileLadder ladder,
+  // All tiles will be of `memory`. REQUIRES: `root` holds a level 0 tile of
+  // it, or is null: one unknown leaf.
+  WorkTree(std::shared_ptr<TileMemory> memory,
+           std::shared_ptr<const TileSlot> root, TileLadder ladder,
            std::uint64_t max_cells, float tolerance_m);
 
+  const std::shared_ptr<TileMemory>& memory() const { return memory_; }
   const TileLadder& ladder() const { return ladder_; }
 
   std::uint64_t leaf_count() const { return leaf_count_; }
@@ -120,7 +125,7 @@ class WorkTree {
   Place Reach(const CellKey& cell, MayDivide may_divide);
 
   // Freezes all open tiles and returns the root.
-  const std::shared_ptr<const Tile>& Freeze();
+  const std::shared_ptr<const TileSlot>& Freeze();
   void FreezeNode(WorkNode& node);
   // Empties a node whose tile has been given up.
   void Discard(WorkNode& node) {
@@ -140,6 +145,7 @@ class WorkTree {
   bool HasRoom() const { return leaf_count_ + 3 <= max_cells_; }
   WorkTile& DivideIntoChild(WorkTile& tile, std::uint32_t start);
 
+  std::shared_ptr<TileMemory> memory_;
   WorkNode root_;
   TileLadder ladder_;
   std::uint64_t max_cells_;

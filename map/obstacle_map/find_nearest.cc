@@ -391,10 +391,10 @@ class Search {
   void OpenCell(const CellKey& cell) {
     const GlobalMapView& global = view_.global();
     const RootSquare& root = global.root();
-    const Tile* tile = global.root_tile().get();
+    const TileSlot* slot = global.root_slot();
     while (true) {
-      const TileTotals& totals = tile->totals();
-      const int below = cell.level - tile->key().level;
+      const TileTotals& totals = slot->totals();
+      const int below = cell.level - slot->key().level;
       if (below == 0) {
         const bool known = totals.known_leaves == totals.leaves;
         if ((question_.unknown_is_free || known) &&
@@ -404,9 +404,9 @@ class Search {
         if (totals.leaves > 1) break;
       }
       const Tile::Found found =
-          tile->Find(PositionInTile(cell, tile->key().level));
+          slot->tile().Find(PositionInTile(cell, slot->key().level));
       if (found.child != nullptr && below >= found.level) {
-        tile = found.child;
+        slot = found.child;
         continue;
       }
       if (found.level > below) break;

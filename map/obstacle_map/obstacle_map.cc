@@ -218,7 +218,7 @@ TransferResult ObstacleMap::TransferEvidence(OpenActivity& open) {
               .leaves_written;
     }
   }
-  result.leaves_after_write = global_.View().known_leaf_count();
+  result.leaves_after_write = global_.CountKnownLeaves();
   global_.Conglomerate(MergeRule::kRange, OpenAreas(&open));
   global_view_ = global_.View();
   result.leaves_after = global_view_.known_leaf_count();
@@ -331,6 +331,7 @@ std::shared_ptr<const ObstacleMapView> ObstacleMap::View() {
       Refresh(open);
     }
   }
+  if (global_.over_budget()) global_view_ = global_.View();
   return std::make_shared<const ObstacleMapView>(ObstacleMapView::Parts{
       .revision = revision_,
       .as_of = as_of_,

@@ -140,6 +140,11 @@ class ObstacleMap {
   // The map as it is. O(open activities + changed pieces).
   std::shared_ptr<const ObstacleMapView> View();
 
+  // Whether readers have unpacked so many tiles of the global map that a view
+  // should be taken, and be read in the place of the last, to pack some.
+  bool over_budget() const { return global_.over_budget(); }
+  TileUse tile_use() const { return global_view_.tile_use(); }
+
   const MissionOptions& options() const { return options_; }
 
   // ---- Restoring a stored map; before any other change. ----

@@ -218,8 +218,14 @@ std::string ObstacleMapView::Digest() const {
   return digest.Hex();
 }
 
+std::shared_ptr<const ObstacleMapView> ObstacleMapView::AtRest() const {
+  Parts parts = parts_;
+  parts.global = parts.global.AtRest();
+  return std::make_shared<const ObstacleMapView>(std::move(parts));
+}
+
 uint64_t ObstacleMapView::memory_bytes() const {
-  uint64_t bytes = parts_.global.memory_bytes();
+  uint64_t bytes = parts_.global.tile_use().memory_bytes;
   for (const ActivityView* activity : open_newest_first_) {
     bytes += activity->local->memory_bytes();
   }

@@ -77,6 +77,10 @@ class ObstacleMapView {
 
   explicit ObstacleMapView(Parts parts);
 
+  // The same for who keeps it for long, to compare a later one with it and to
+  // ask nothing else: see GlobalMapView::AtRest.
+  std::shared_ptr<const ObstacleMapView> AtRest() const;
+
   // Grows by one with every applied event.
   uint64_t revision() const { return parts_.revision; }
   // Time of the newest evidence; the epoch if there is none.
@@ -122,7 +126,7 @@ class ObstacleMapView {
   std::string Digest() const;
 
   // Heap memory of the maps, bytes (approximate; pieces shared with other
-  // views count here too).
+  // views count here too, and of the global map those that only they hold).
   uint64_t memory_bytes() const;
 
  private:

@@ -7,6 +7,7 @@
 #include <limits>
 #include <random>
 
+#include "map/global/tile_memory.h"
 #include "tests/testing/status_matchers.h"
 
 namespace fathom::map {
@@ -202,8 +203,9 @@ TEST(Tile, LeadsToItsChildren) {
   const TileKey child_key{.level = 6, .row = 0, .col = 1};
   const Slots below{.levels = {1, 1, 1, 1},
                     .leaves = {Prior(1), Prior(2), Prior(3), Prior(4)}};
-  auto child =
-      Tile::Build(child_key, below.levels, below.leaves, {}, kTolerance);
+  const auto child = std::make_shared<const TileSlot>(
+      std::make_shared<TileMemory>(TileMemoryOptions{}, kTolerance),
+      Tile::Build(child_key, below.levels, below.leaves, {}, kTolerance));
   // Level 6 cells 0..3 (the second is the child), then whatever is left.
   Slots slots;
   slots.levels = {6, 6, 6, 6, 5, 5, 5, 4, 4, 4, 3, 3, 3, 2, 2, 2, 1, 1, 1};
