@@ -41,10 +41,16 @@ class Published {
       MutexLock lock(mutex_);
       newest_.swap(next);
     }
+    FreeReplaced();
+    if (next != nullptr) replaced_.push_back(std::move(next));
+  }
+
+  // Frees those that were replaced and that nobody reads any more, the last one
+  // too. The publishing thread only.
+  void FreeReplaced() {
     // Only this list can hand out what it alone holds: a count of one stays.
     std::erase_if(replaced_,
                   [](const Ptr& old) { return old.use_count() == 1; });
-    if (next != nullptr) replaced_.push_back(std::move(next));
   }
 
   // Objects kept for readers, and the last that was replaced. The publishing

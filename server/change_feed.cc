@@ -92,7 +92,7 @@ void ChangeFeed::Run() {
     bool soon = false;
     {
       MutexLock lock(mutex_);
-      if (changed) log_.Show(view);
+      log_.Show(view);
       std::swap(soon, soon_);
     }
     now = std::chrono::steady_clock::now();

@@ -139,7 +139,13 @@ std::vector<ChangeLog::AreaKey> ChangeLog::AreasChanged(
 
 void ChangeLog::Show(ViewPtr view) {
   const ViewPtr before = this->view();
-  if (view->revision() <= before->revision()) return;
+  if (view->revision() < before->revision() || view == before) return;
+  if (view->revision() == before->revision()) {
+    // Nothing has changed but what it keeps in memory.
+    MutexLock lock(mutex_);
+    view_ = std::move(view);
+    return;
+  }
   const std::vector<AreaKey> areas = AreasChanged(*before, *view);
   std::vector<map::ContactKey> contacts;
   map::DiffContacts(

@@ -60,8 +60,9 @@ class ChangeLog {
 
   // Begins with this view: what was before it is past.
   void Restart(ViewPtr view);
-  // The next view of the same map; an older one is passed over. REQUIRES:
-  // Restart; one call at a time.
+  // The next view of the same map; an older one is passed over, and of one of
+  // the same revision only the view is kept. REQUIRES: Restart; one call at a
+  // time.
   void Show(ViewPtr view);
   // Lets go of the view. Restart before the next use.
   void Rest();

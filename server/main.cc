@@ -49,6 +49,9 @@ constexpr int kExitFileFailed = 3;
 constexpr double kMaxHistoryAgeDays = 36'525;
 constexpr std::uint64_t kMaxHistoryMb = 1'000'000'000'000;
 
+// A tebibyte: a hundred times what a map of the most cells (10^9) takes.
+constexpr std::uint64_t kMaxGlobalMemoryMib = std::uint64_t{1} << 20;
+
 constexpr double kMetresPerNmi = 1852;  // Exact, by definition.
 
 constexpr char kAbout[] =
@@ -85,6 +88,8 @@ struct Flags {
   double ageing_m2_per_day = 0;
   std::optional<double> history_max_age_days;
   std::optional<std::uint64_t> history_max_mb;
+  // 64 MiB: some 7 million leaves are all at hand.
+  std::uint64_t global_memory_mib = 64;
   NewMission mission;
   ListenOptions listen;
   std::string log_level = "info";
@@ -108,6 +113,16 @@ void AddFlags(CLI::App& app, Flags& flags) {
                  "debug, info, warning or error; the log goes to standard "
                  "error")
       ->capture_default_str();
+
+  app.add_option("--global-memory-mib", flags.global_memory_mib,
+                 "Memory for the parts of the global map that are ready to be "
+                 "read, MiB (about 9 bytes a cell). What was not read for "
+                 "longest is kept beside it packed, in 3 bytes a cell, and "
+                 "takes 0.1 ms to unpack when it is asked for; nothing is read "
+                 "from the disk")
+      ->check(CLI::Range(std::uint64_t{1}, kMaxGlobalMemoryMib))
+      ->capture_default_str()
+      ->type_name("MIB");
 
   const char* const kHistory = "The contact history (all is kept by default)";
   app.add_option("--history-max-age-days", flags.history_max_age_days,
@@ -150,7 +165,8 @@ void AddFlags(CLI::App& app, Flags& flags) {
       "Neighbouring cells whose depths agree within this become one, metres")
       ->capture_default_str();
   add("--max-cells", flags.mission.max_cells,
-      "Most cells of the global map (about 12 bytes each)")
+      "Most cells of the global map (about 12 bytes each; 3 beyond "
+      "--global-memory-mib)")
       ->capture_default_str();
   add("--max-contacts", flags.mission.max_contacts,
       "Most moving obstacles tracked at once")
@@ -274,7 +290,8 @@ absl::Status Serve(Flags& flags, bool& file_failed) {
   FATHOM_ASSIGN_OR_RETURN(const auto file, OpenFile(flags, clock));
   file->LimitHistory(HistoryLimitsOf(flags));
   NewFileGuard guard(flags.create ? flags.mission_path : "");
-  FATHOM_ASSIGN_OR_RETURN(MapKeeper::Restored restored, RestoreMission(*file));
+  FATHOM_ASSIGN_OR_RETURN(MapKeeper::Restored restored,
+                          RestoreMission(*file, flags.global_memory_mib << 20));
   Log(LogLevel::kInfo, "mission opened path=%s revision=%d replayed=%d",
       flags.mission_path, restored.map->revision(), restored.journal_records);
   for (const std::string& damage : restored.damage) {

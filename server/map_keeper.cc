@@ -65,7 +65,8 @@ MapKeeper::MapKeeper(Restored restored, MissionStore& store,
       records_since_checkpoint_(restored.journal_records),
       checkpoint_revision_(restored.checkpoint ? restored.checkpoint->revision()
                                                : 0),
-      saved_view_(std::move(restored.checkpoint)) {
+      saved_view_(restored.checkpoint ? restored.checkpoint->AtRest()
+                                      : nullptr) {
   storage_.journal_records = restored.journal_records;
   storage_.durable_revision = map_->revision();
   Publish();
@@ -287,11 +288,19 @@ void MapKeeper::WakeMapper() {
 }
 
 bool MapKeeper::TakeCommands(std::vector<Command>& commands) {
+  // What is packed may be unpacked by readers meanwhile.
+  const bool any_packed = map_->tile_use().packed_tiles > 0;
   MutexLock lock(mutex_);
   while (queue_.empty() && !stopping_) {
     mapper_waits_ = true;
-    queue_changed_.Wait(mutex_);
+    bool in_time = true;
+    if (any_packed) {
+      in_time = queue_changed_.WaitFor(mutex_, kTileBudgetInterval);
+    } else {
+      queue_changed_.Wait(mutex_);
+    }
     mapper_waits_ = false;
+    if (!in_time && queue_.empty() && !stopping_) return true;
   }
   if (paced_from_ != SteadyTime{}) {
     const SteadyTime due = paced_from_ + options_.view_interval;
@@ -315,6 +324,10 @@ void MapKeeper::RunMapper() {
   std::vector<std::function<void(const absl::Status&)>> applied;
   std::vector<StorageItem> items;
   while (TakeCommands(commands)) {
+    if (commands.empty()) {
+      KeepTileBudget();
+      continue;
+    }
     items.reserve(commands.size() + 1);
     size_t refused_commands = 0;
     bool any_record = false;
@@ -461,6 +474,12 @@ void MapKeeper::ApplyContact(IngestMessage& message, MessageOutcome& outcome,
       storage::ContactRecord{.epoch = message.number.epoch,
                              .sequence = message.number.sequence,
                              .report = std::move(report)}};
+}
+
+void MapKeeper::KeepTileBudget() {
+  // Of the same revision: nothing changes but what is held in memory.
+  if (map_->over_budget()) Publish();
+  views_.FreeReplaced();
 }
 
 MapKeeper::ViewPtr MapKeeper::Publish() {

@@ -246,7 +246,11 @@ class MapKeeper {
 
   // The mapper thread.
   void RunMapper();
+  // False: stopping, and none is left. True without any: see to the tiles.
   bool TakeCommands(std::vector<Command>& commands);
+  // Packs tiles of the global map that readers have unpacked beyond the budget,
+  // and frees what nobody reads any more.
+  void KeepTileBudget();
   // Whether the mapper should not wait for more messages; wakes it if so, or
   // if it waits for the first.
   bool MapperIsDue() const FATHOM_REQUIRES(mutex_);

@@ -94,7 +94,7 @@ absl::Status MapKeeper::CommitItems(std::vector<StorageItem>& items) {
           storage::Checkpoint{.now = checkpoint, .previous = saved_view_};
     }
     FATHOM_RETURN_IF_ERROR(CommitBatch(batch, items));
-    if (checkpoint != nullptr) saved_view_ = std::move(checkpoint);
+    if (checkpoint != nullptr) saved_view_ = checkpoint->AtRest();
     {
       MutexLock lock(mutex_);
       storage_.durable_revision = items[end - 1].revision;

@@ -12,6 +12,7 @@
 #include "map/global/root_square.h"
 #include "server/limits.h"
 #include "storage/restore.h"
+#include "storage/tile_codec.h"
 
 namespace fathom::server {
 namespace {
@@ -102,10 +103,13 @@ absl::StatusOr<std::unique_ptr<storage::MissionFile>> CreateMission(
                  map::FilterName(map::ContactMapOptions{}.filter))});
 }
 
-absl::StatusOr<MapKeeper::Restored> RestoreMission(storage::MissionFile& file) {
-  FATHOM_ASSIGN_OR_RETURN(storage::Loaded loaded, file.Load());
-  FATHOM_ASSIGN_OR_RETURN(const map::MissionOptions options,
+absl::StatusOr<MapKeeper::Restored> RestoreMission(storage::MissionFile& file,
+                                                   uint64_t tile_budget_bytes) {
+  FATHOM_ASSIGN_OR_RETURN(storage::Loaded loaded, file.Load(tile_budget_bytes));
+  FATHOM_ASSIGN_OR_RETURN(map::MissionOptions options,
                           storage::OptionsOf(loaded.metadata));
+  options.global.memory = {.budget_bytes = tile_budget_bytes,
+                           .codec = storage::kTileCodec};
   MapKeeper::Restored restored;
   for (const storage::SourcePosition& position : loaded.source_positions) {
     restored.ledger.Restore(position.stream, position.source,

@@ -47,9 +47,11 @@ absl::StatusOr<map::GeodeticPoint> ParsePoint(std::string_view text);
 absl::StatusOr<std::unique_ptr<storage::MissionFile>> CreateMission(
     const std::string& path, const NewMission& mission, Time now);
 
-// Reads the file and rebuilds the map. Errors: those of MissionFile::Load and
+// Reads the file and rebuilds the map, whose tiles may take `tile_budget_bytes`
+// unpacked (map::TileMemory). Errors: those of MissionFile::Load and
 // storage::RestoreMap.
-absl::StatusOr<MapKeeper::Restored> RestoreMission(storage::MissionFile& file);
+absl::StatusOr<MapKeeper::Restored> RestoreMission(storage::MissionFile& file,
+                                                   uint64_t tile_budget_bytes);
 
 }  // namespace fathom::server
 

@@ -180,7 +180,13 @@ grpc::ServerUnaryReactor* MissionService::GetMissionStatus(
   global->set_leaves(map.known_leaf_count());
   global->set_max_cells(metadata.max_cells);
   global->set_degraded(view->counters().degraded);
-  global->set_memory_bytes(map.memory_bytes());
+  const map::TileUse use = map.tile_use();
+  global->set_memory_bytes(use.memory_bytes);
+  global->set_tile_budget_bytes(use.budget_bytes);
+  global->set_unpacked_bytes(use.unpacked_bytes);
+  global->set_packed_bytes(use.packed_bytes);
+  global->set_unpacked_tiles(use.unpacked_tiles);
+  global->set_packed_tiles(use.packed_tiles);
   global->set_tolerance_m(metadata.tolerance_m);
 
   v1::ContactListStatus* contacts = response->mutable_contacts();

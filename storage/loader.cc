@@ -33,13 +33,30 @@ struct TileRow {
   Bytes blob;
 };
 
-absl::StatusOr<map::RestoredTile> RestoreRow(const TileRow& row,
-                                             const map::MissionOptions& map) {
+// How the tiles are to be made.
+struct TilePlan {
+  map::MissionOptions map;
+  // What those without children may take; beyond it they stay packed.
+  std::uint64_t unpacked_bytes;
+  // What those that were made take.
+  std::atomic<std::uint64_t> taken{0};
+};
+
+absl::StatusOr<map::RestoredTile> RestoreRow(TileRow& row, TilePlan& plan) {
   FATHOM_ASSIGN_OR_RETURN(map::TileContent content,
                           DecodeTile(row.key, row.blob));
-  return map::RestoredTile::Make(row.key, std::move(content),
-                                 map.global.root.max_level(),
-                                 static_cast<float>(map.global.tolerance_m));
+  FATHOM_ASSIGN_OR_RETURN(
+      map::RestoredTile tile,
+      map::RestoredTile::Make(row.key, std::move(content),
+                              plan.map.global.root.max_level(),
+                              static_cast<float>(plan.map.global.tolerance_m)));
+  if (tile.tile == nullptr || tile.key.level == 0) return tile;
+  const std::uint64_t bytes = tile.tile->memory_bytes();
+  if (plan.taken.fetch_add(bytes) + bytes > plan.unpacked_bytes) {
+    plan.taken -= bytes;
+    tile.Pack(std::move(row.blob));
+  }
+  return tile;
 }
 
 // Tiles as they come: the sound ones, and which are not.
@@ -60,13 +77,13 @@ struct TileHarvest {
 
 // Decodes, checks and builds the tiles of `rows` on several threads, in the
 // order of the rows.
-absl::Status RestoreRows(const std::vector<TileRow>& rows,
-                         const map::MissionOptions& map, TileHarvest& harvest) {
+absl::Status RestoreRows(std::vector<TileRow>& rows, TilePlan& plan,
+                         TileHarvest& harvest) {
   std::vector<absl::StatusOr<map::RestoredTile>> tiles(rows.size());
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
     for (std::size_t i = next++; i < rows.size(); i = next++) {
-      tiles[i] = RestoreRow(rows[i], map);
+      tiles[i] = RestoreRow(rows[i], plan);
     }
   };
   const unsigned threads = std::clamp(std::thread::hardware_concurrency(), 1u,
@@ -181,9 +198,11 @@ absl::StatusOr<bool> ReadTileRows(Connection& connection, std::int64_t& last,
   return true;
 }
 
-absl::Status LoadTiles(Connection& connection, Loaded& loaded) {
+absl::Status LoadTiles(Connection& connection,
+                       std::uint64_t unpacked_tile_bytes, Loaded& loaded) {
   FATHOM_ASSIGN_OR_RETURN(const map::MissionOptions map,
                           OptionsOf(loaded.metadata));
+  TilePlan plan{.map = map, .unpacked_bytes = unpacked_tile_bytes};
   TileHarvest harvest;
   std::int64_t last = -1;
   bool more = true;
@@ -191,7 +210,7 @@ absl::Status LoadTiles(Connection& connection, Loaded& loaded) {
     std::vector<TileRow> rows;
     FATHOM_ASSIGN_OR_RETURN(more,
                             ReadTileRows(connection, last, rows, harvest));
-    FATHOM_RETURN_IF_ERROR(RestoreRows(rows, map, harvest));
+    FATHOM_RETURN_IF_ERROR(RestoreRows(rows, plan, harvest));
   }
   FATHOM_RETURN_IF_ERROR(
       MendTree(map.global, harvest.damaged, harvest.sound, harvest.damage));
@@ -344,11 +363,12 @@ absl::StatusOr<std::vector<SourcePosition>> LoadSourcePositions(
   }
 }
 
-absl::StatusOr<Loaded> LoadMission(Connection& connection) {
+absl::StatusOr<Loaded> LoadMission(Connection& connection,
+                                   std::uint64_t unpacked_tile_bytes) {
   Loaded loaded;
   FATHOM_ASSIGN_OR_RETURN(loaded.metadata, ReadMetadata(connection));
   FATHOM_RETURN_IF_ERROR(LoadCheckpointMark(connection, loaded));
-  FATHOM_RETURN_IF_ERROR(LoadTiles(connection, loaded));
+  FATHOM_RETURN_IF_ERROR(LoadTiles(connection, unpacked_tile_bytes, loaded));
   FATHOM_RETURN_IF_ERROR(LoadActivities(connection, loaded));
   FATHOM_RETURN_IF_ERROR(LoadContacts(connection, loaded));
   FATHOM_ASSIGN_OR_RETURN(loaded.source_positions,
@@ -377,7 +397,8 @@ absl::StatusOr<Loaded> SalvageMission(Connection& connection) {
     loaded.damage.push_back(std::string(status.message()));
     return absl::OkStatus();
   };
-  FATHOM_RETURN_IF_ERROR(note(LoadTiles(connection, loaded)));
+  FATHOM_RETURN_IF_ERROR(
+      note(LoadTiles(connection, map::TileMemoryOptions::kUnlimited, loaded)));
   FATHOM_RETURN_IF_ERROR(note(LoadActivities(connection, loaded)));
   FATHOM_RETURN_IF_ERROR(note(LoadContacts(connection, loaded)));
   auto positions = LoadSourcePositions(connection);

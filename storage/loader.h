@@ -3,6 +3,7 @@
 #ifndef FATHOM_STORAGE_LOADER_H_
 #define FATHOM_STORAGE_LOADER_H_
 
+#include <cstdint>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -12,9 +13,12 @@
 namespace fathom::storage {
 
 // Tiles are decoded, checked and built on up to four threads; all have ended
-// when it returns.
+// when it returns. When those without children take `unpacked_tile_bytes`, the
+// others come packed (for map::TileMemory with kTileCodec).
 // Errors: DATA_LOSS naming the row whose blob is damaged; those of sqlite.h.
-absl::StatusOr<Loaded> LoadMission(Connection& connection);
+absl::StatusOr<Loaded> LoadMission(
+    Connection& connection,
+    std::uint64_t unpacked_tile_bytes = map::TileMemoryOptions::kUnlimited);
 
 // The same of a damaged mission: what cannot be read is left out and told in
 // Loaded::damage; of the journal, all from the first bad segment on. Errors:

@@ -103,7 +103,7 @@ class MissionFile::Impl {
 
   absl::Status Commit(const Batch& batch);
   void LimitHistory(const HistoryLimits& limits);
-  absl::StatusOr<Loaded> Load();
+  absl::StatusOr<Loaded> Load(std::uint64_t unpacked_tile_bytes);
   absl::Status CopyLog();
   absl::Status Close();
   absl::Status ReadContactHistory(
@@ -372,8 +372,10 @@ void MissionFile::Impl::LimitHistory(const HistoryLimits& limits) {
   status_.history_limits = limits;
 }
 
-absl::StatusOr<Loaded> MissionFile::Impl::Load() {
-  FATHOM_ASSIGN_OR_RETURN(Loaded loaded, LoadMission(writer_));
+absl::StatusOr<Loaded> MissionFile::Impl::Load(
+    std::uint64_t unpacked_tile_bytes) {
+  FATHOM_ASSIGN_OR_RETURN(Loaded loaded,
+                          LoadMission(writer_, unpacked_tile_bytes));
   if (must_load_) {
     FATHOM_ASSIGN_OR_RETURN(const std::vector<ContactHistoryRow> rows,
                             ReplayHistory(loaded));
@@ -562,7 +564,9 @@ absl::Status MissionFile::Commit(const Batch& batch) {
 void MissionFile::LimitHistory(const HistoryLimits& limits) {
   impl_->LimitHistory(limits);
 }
-absl::StatusOr<Loaded> MissionFile::Load() { return impl_->Load(); }
+absl::StatusOr<Loaded> MissionFile::Load(std::uint64_t unpacked_tile_bytes) {
+  return impl_->Load(unpacked_tile_bytes);
+}
 absl::Status MissionFile::CopyLog() { return impl_->CopyLog(); }
 absl::Status MissionFile::Close() { return impl_->Close(); }
 

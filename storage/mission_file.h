@@ -133,9 +133,12 @@ class MissionFile {
   // journal, whose part of the contact history is made again here. A blob whose
   // checksum fails is DATA_LOSS naming the block, contact or segment; only a
   // tile is left out and told in Loaded::damage (quarantine.h). Tiles are
-  // decoded on up to four threads, ended when it returns. Cost: about 30 ns
-  // of processor time per leaf.
-  absl::StatusOr<Loaded> Load();
+  // decoded on up to four threads, ended when it returns; when those without
+  // children take `unpacked_tile_bytes` the others come packed, for a map whose
+  // GlobalMapOptions::memory has kTileCodec. Cost: about 30 ns of processor
+  // time per leaf.
+  absl::StatusOr<Loaded> Load(
+      std::uint64_t unpacked_tile_bytes = map::TileMemoryOptions::kUnlimited);
 
   // Copies the log into the file as far as no reader is in the way; for idle
   // moments. Never waits. Commit does it by size.

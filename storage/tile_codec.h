@@ -10,6 +10,7 @@
 
 #include "absl/status/statusor.h"
 #include "map/global/tile.h"
+#include "map/global/tile_memory.h"
 #include "map/local/local_block.h"
 #include "storage/bytes.h"
 
@@ -42,6 +43,10 @@ Bytes EncodeTile(const map::TileKey& key, const map::TileContent& content);
 // Errors: DATA_LOSS naming the tile; UNIMPLEMENTED for a newer version.
 absl::StatusOr<map::TileContent> DecodeTile(const map::TileKey& key,
                                             ByteSpan blob);
+
+// The same two for a map that keeps tiles packed in memory: as they are stored.
+inline constexpr map::TileCodec kTileCodec = {.pack = EncodeTile,
+                                              .unpack = DecodeTile};
 
 // REQUIRES: `nervegna` holds 0 or 256 elements.
 Bytes EncodeBlock(const BlockKey& key, const map::LocalBlock& block);

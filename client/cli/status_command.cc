@@ -30,6 +30,14 @@ std::string Summary(const v1::GetMissionStatusResponse& s) {
       "%.3g m\n",
       CountText(map.leaves()), CountText(map.max_cells()),
       BytesText(map.memory_bytes()), map.min_cell_m(), map.tolerance_m());
+  if (map.packed_tiles() > 0) {
+    absl::StrAppendFormat(
+        &text, "            %s of %s tiles packed in %s; unpacked %s of %s\n",
+        CountText(map.packed_tiles()),
+        CountText(map.packed_tiles() + map.unpacked_tiles()),
+        BytesText(map.packed_bytes()), BytesText(map.unpacked_bytes()),
+        BytesText(map.tile_budget_bytes()));
+  }
   if (map.degraded() > 0) {
     absl::StrAppendFormat(
         &text, "            %s updates went to a coarser leaf (map full)\n",

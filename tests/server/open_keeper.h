@@ -25,12 +25,13 @@ struct Open {
 // REQUIRES: the file could be opened; the calling test fails if its mission
 // cannot be restored.
 inline Open OpenKeeper(
-    absl::StatusOr<std::unique_ptr<storage::MissionFile>> file) {
+    absl::StatusOr<std::unique_ptr<storage::MissionFile>> file,
+    uint64_t tile_budget_bytes = map::TileMemoryOptions::kUnlimited) {
   EXPECT_THAT(file, ::fathom::testing::IsOk());
   Open open;
   open.file = *std::move(file);
   open.store = std::make_unique<MissionFileStore>(*open.file);
-  auto restored = RestoreMission(*open.file);
+  auto restored = RestoreMission(*open.file, tile_budget_bytes);
   EXPECT_THAT(restored, ::fathom::testing::IsOk());
   open.keeper = std::make_unique<MapKeeper>(*std::move(restored), *open.store,
                                             KeeperOptions{});
