@@ -390,11 +390,27 @@ void ForgetPeak() {
   std::ofstream("/proc/self/clear_refs") << 5;
 }
 
-// From the closed file to the first answer (the file is in the page cache).
-void BM_Open10MLeaves(benchmark::State& state) {
+const LargeFile& Large() {
   static const LargeFile large;
+  return large;
+}
+
+// The large mission, its tiles within the budget.
+absl::StatusOr<RestoredMap> Restore(MissionFile& file,
+                                    std::uint64_t budget_bytes) {
+  auto loaded = file.Load(budget_bytes);
+  if (!loaded.ok()) return loaded.status();
+  auto options = OptionsOf(loaded->metadata);
+  if (!options.ok()) return options.status();
+  options->global.memory = {.budget_bytes = budget_bytes, .codec = kTileCodec};
+  return RestoreMap(*std::move(loaded), *options);
+}
+
+// From the closed file to the first answer (the file is in the page cache).
+void OpenLarge(benchmark::State& state, std::uint64_t budget_bytes) {
+  const LargeFile& large = Large();
+  map::TileUse use;
   double seconds = 0;
-  double load_s = 0;
   double peak_bytes = 0;
   double held_bytes = 0;
   for (auto _ : state) {
@@ -404,22 +420,18 @@ void BM_Open10MLeaves(benchmark::State& state) {
     state.ResumeTiming();
     const auto start = std::chrono::steady_clock::now();
     auto file = MissionFile::Open(large.path());
-    auto loaded = (*file)->Load();
-    if (!loaded.ok()) std::abort();
-    const auto read = std::chrono::steady_clock::now();
-    const auto options = OptionsOf(loaded->metadata);
-    auto restored = RestoreMap(*std::move(loaded), *options);
+    auto restored = Restore(**file, budget_bytes);
     if (!restored.ok()) std::abort();
     const auto answer = restored->map->View()->SeabedAt(
         {.latitude_deg = 41.5, .longitude_deg = -70.8});
     if (!answer.has_value()) std::abort();
     const auto end = std::chrono::steady_clock::now();
-    load_s += std::chrono::duration<double>(read - start).count();
     seconds += std::chrono::duration<double>(end - start).count();
     state.PauseTiming();
     peak_bytes = MemoryOf("VmHWM:") - before_bytes;
     malloc_trim(0);
     held_bytes = MemoryOf("VmRSS:") - before_bytes;
+    use = restored->map->tile_use();
     restored->map.reset();
     restored->checkpoint.reset();
     file->reset();
@@ -427,14 +439,69 @@ void BM_Open10MLeaves(benchmark::State& state) {
   }
   const double rounds = static_cast<double>(state.iterations());
   state.counters["seconds"] = seconds / rounds;
-  state.counters["load_s"] = load_s / rounds;
   state.counters["leaves"] = large.leaves();
   state.counters["disk_bytes_per_leaf"] = large.bytes() / large.leaves();
   state.counters["write_s"] = large.write_s();
   state.counters["peak_mb"] = peak_bytes / 1e6;
   state.counters["ram_bytes_per_leaf"] = held_bytes / large.leaves();
+  state.counters["told_mb"] = static_cast<double>(use.memory_bytes) / 1e6;
+  state.counters["packed_mb"] = static_cast<double>(use.packed_bytes) / 1e6;
+  state.counters["packed_tiles"] = static_cast<double>(use.packed_tiles);
+}
+
+void BM_Open10MLeaves(benchmark::State& state) {
+  OpenLarge(state, map::TileMemoryOptions::kUnlimited);
 }
 BENCHMARK(BM_Open10MLeaves)->UseRealTime()->Unit(benchmark::kMillisecond);
+
+// The same, tiles beyond so many MiB packed.
+void BM_OpenPacked10MLeaves(benchmark::State& state) {
+  OpenLarge(state, static_cast<std::uint64_t>(state.range(0)) << 20);
+}
+BENCHMARK(BM_OpenPacked10MLeaves)
+    ->Arg(64)
+    ->Arg(8)
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
+
+// A point in a tile that is packed, and packing it again (its bytes are there):
+// `unpack_us` and `evict_us`.
+void BM_FirstTouch(benchmark::State& state) {
+  auto file = MissionFile::Open(Large().path());
+  auto restored = Restore(**file, 0);
+  if (!restored.ok()) std::abort();
+  std::vector<map::GeodeticPoint> places;
+  for (int i = 0; i < 200; ++i) {
+    // 640 m tiles: no two places in one.
+    places.push_back({.latitude_deg = 41.45 + 0.01 * (i % 14),
+                      .longitude_deg = -70.85 + 0.012 * (i / 14)});
+  }
+  using Clock = std::chrono::steady_clock;
+  const auto micros = [](Clock::time_point from) {
+    return std::chrono::duration<double, std::micro>(Clock::now() - from)
+        .count();
+  };
+  double unpack_us = 0;
+  double evict_us = 0;
+  std::uint64_t tiles = 0;
+  for (auto _ : state) {
+    const auto view = restored->map->View();
+    const auto start = Clock::now();
+    for (const map::GeodeticPoint& place : places) {
+      benchmark::DoNotOptimize(view->SeabedAt(place));
+    }
+    unpack_us += micros(start);
+    tiles += view->global().tile_use().unpacked_tiles;
+    const auto packing = Clock::now();
+    benchmark::DoNotOptimize(restored->map->View());
+    evict_us += micros(packing);
+  }
+  state.counters["tiles"] =
+      static_cast<double>(tiles) / static_cast<double>(state.iterations());
+  state.counters["unpack_us"] = unpack_us / static_cast<double>(tiles);
+  state.counters["evict_us"] = evict_us / static_cast<double>(tiles);
+}
+BENCHMARK(BM_FirstTouch)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace fathom::storage
