@@ -19,9 +19,11 @@ static_assert(std::endian::native == std::endian::little,
               "points are copied from memory; add a byte swap first");
 
 // 2 added the recent reports; of an older one there are none. 3 is 2 and the
-// contact's other names behind, written where it has any.
+// contact's other names behind, written where it has any. 4 has the older
+// estimates, and the names where it has any, written where there are such.
 constexpr std::uint8_t kContactVersion = 2;
 constexpr std::uint8_t kLinkedContactVersion = 3;
+constexpr std::uint8_t kOlderContactVersion = 4;
 // 2 is 1 and the other names behind, written where there were any.
 constexpr std::uint8_t kLinkedEstimateVersion = 2;
 
@@ -223,21 +225,31 @@ Bytes EncodeContact(const map::StoredContact& contact) {
     writer.PutU8(recent.gated ? kGatedFate : recent.points);
     PutContactReport(recent.report, writer);
   }
+  std::uint8_t version =
+      contact.links.has_value() ? kLinkedContactVersion : kContactVersion;
+  if (!contact.older.empty()) {
+    version = kOlderContactVersion;
+    ByteWriter older;
+    older.Reserve(contact.older.size() * kContactPointBytes);
+    for (const map::ContactPoint& point : contact.older) {
+      PutContactPoint(point, older);
+    }
+    writer.PutVarint(contact.older.size());
+    PutRows(older.bytes(), kContactPointBytes, writer);
+    writer.PutBool(contact.links.has_value());
+  }
   if (contact.links.has_value()) {
     writer.PutTime(contact.links->since);
     PutNames(contact.links->names, writer);
   }
-  return SealBlob(
-      BlobKind::kContact,
-      contact.links.has_value() ? kLinkedContactVersion : kContactVersion,
-      std::move(writer));
+  return SealBlob(BlobKind::kContact, version, std::move(writer));
 }
 
 absl::StatusOr<map::StoredContact> DecodeContact(ByteSpan blob,
                                                  std::string_view what) {
   FATHOM_ASSIGN_OR_RETURN(
       const ByteSpan payload,
-      OpenBlob(BlobKind::kContact, kLinkedContactVersion, blob, what));
+      OpenBlob(BlobKind::kContact, kOlderContactVersion, blob, what));
   ByteReader reader(payload);
   map::StoredContact contact;
   contact.key.source.value = reader.GetString();
@@ -254,12 +266,25 @@ absl::StatusOr<map::StoredContact> DecodeContact(ByteSpan blob,
       GetContactReport(reader, recent.report);
     }
   }
-  if (blob[1] >= kLinkedContactVersion) {
+  bool linked = blob[1] == kLinkedContactVersion;
+  Bytes older;
+  if (blob[1] == kOlderContactVersion) {
+    contact.older.resize(reader.GetCount(map::kOlderEstimates));
+    if (contact.older.empty()) reader.Fail();
+    older = GetRows(reader, contact.older.size(), kContactPointBytes);
+    linked = reader.GetBool();
+  }
+  if (linked) {
     contact.links.emplace();
     contact.links->since = reader.GetTime();
     contact.links->names = GetNames(reader);
   }
   FATHOM_RETURN_IF_ERROR(reader.Finish(what));
+  ByteReader older_rows(older);
+  for (map::ContactPoint& point : contact.older) {
+    GetContactPoint(older_rows, point);
+  }
+  FATHOM_RETURN_IF_ERROR(older_rows.Finish(what));
   ByteReader rows(bytes);
   contact.estimates.resize(count);
   for (map::ContactEstimate& estimate : contact.estimates) {

@@ -36,8 +36,9 @@ std::vector<map::ContactKey> GetNames(ByteReader& reader);
 absl::StatusOr<map::ContactEstimate> DecodeContactEstimate(
     ByteSpan blob, std::string_view what);
 
-// A contact with its recent estimates and reports.
-// REQUIRES: 1 to map::kRecentEstimates estimates.
+// A contact with its recent estimates and reports, and what is kept of the
+// estimates before. REQUIRES: 1 to map::kRecentEstimates estimates, at most
+// map::kOlderEstimates older ones.
 Bytes EncodeContact(const map::StoredContact& contact);
 // Errors: DATA_LOSS naming `what`; UNIMPLEMENTED for a newer version.
 absl::StatusOr<map::StoredContact> DecodeContact(ByteSpan blob,

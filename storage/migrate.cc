@@ -91,6 +91,12 @@ absl::Status BlocksToVersion8(Connection& connection) {
   return transaction.Commit();
 }
 
+// A contact may have older estimates now (contact_codec.h), which a program of
+// before does not read; there are none yet.
+absl::Status ToVersion9(Connection& connection) {
+  return connection.Execute("PRAGMA user_version = 9");
+}
+
 }  // namespace
 
 absl::Status Migrate(const std::string& path, Connection& connection) {
@@ -99,8 +105,12 @@ absl::Status Migrate(const std::string& path, Connection& connection) {
   if (version == kSchemaVersion) return absl::OkStatus();
   FATHOM_RETURN_IF_ERROR(BackUp(path, version, connection));
   if (version < 6) FATHOM_RETURN_IF_ERROR(ToVersion6(connection));
-  return version < kFirstBlockVersion ? RowsToVersion8(connection)
-                                      : BlocksToVersion8(connection);
+  if (version < kFirstBlockVersion) {
+    FATHOM_RETURN_IF_ERROR(RowsToVersion8(connection));
+  } else if (version < kFirstFeatureVersion) {
+    FATHOM_RETURN_IF_ERROR(BlocksToVersion8(connection));
+  }
+  return ToVersion9(connection);
 }
 
 }  // namespace fathom::storage

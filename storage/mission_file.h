@@ -47,7 +47,7 @@ inline constexpr std::int32_t kApplicationId = 0x4674686D;
 
 // The user_version that this program writes, and the oldest that it reads.
 // Older ones were never released.
-inline constexpr int kSchemaVersion = 8;
+inline constexpr int kSchemaVersion = 9;
 inline constexpr int kOldestSchemaVersion = 5;
 
 // Size of the write-ahead log beyond which Commit copies it into the file

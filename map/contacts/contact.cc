@@ -1,71 +1,25 @@
 #include "map/contacts/contact.h"
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
-
-#include "map/contacts/filter.h"
-#include "map/geodesy/ned_frame.h"
+#include <array>
 
 namespace fathom::map {
-namespace {
-
-// Beyond this the plane's place of a point is read as azimuth and distance
-// along the Earth: for a contact predicted that far the difference is nothing
-// beside its uncertainty, and it is defined at any distance.
-constexpr double kPlaneReachM = 500'000;
-
-// Whether `next`, the estimate after `point`, is of the same life and plain to
-// smooth from: not a marker of a drop.
-bool GoesOn(const ContactPoint& point, const ContactPoint& next) {
-  return point.status != ContactStatus::kDropped &&
-         next.status != ContactStatus::kDropped &&
-         next.track_start == point.track_start;
+void Contact::Append(const ContactPoint& point,
+                     const ContactClassTable& classes) {
+  older_.Next(history_, point, classes);
+  history_.Append(point);
 }
 
-// `point` after what `next`, an estimate later or at the same time, tells.
-ContactPoint SmoothedBy(const ContactPoint& point, const ContactPoint& next,
-                        const ContactClassTable& classes) {
-  const ContactPoint predicted = PredictPoint(point, next.time, classes);
-  const ContactPoint there = InPlaneAt(next, point.frame_origin);
-  const TrackState state = SmoothBack(
-      {.x = point.x, .P = point.P}, ToSeconds(next.time - point.time),
-      {.x = predicted.x, .P = predicted.P}, {.x = there.x, .P = there.P});
-  ContactPoint smoothed = point;
-  smoothed.x = state.x;
-  smoothed.P = state.P;
-  return smoothed;
+void Contact::Truncate(std::size_t size) {
+  older_.Truncate(size);
+  history_.Truncate(size);
 }
 
-}  // namespace
-
-GeodeticPoint ContactPoint::Position() const {
-  const double distance_m = std::hypot(x(0), x(1));
-  if (distance_m == 0.0) return frame_origin;
-  if (distance_m <= kPlaneReachM) {
-    return NedFrame(frame_origin).ToGeodetic(x(0), x(1));
-  }
-  const double azimuth_deg = std::atan2(x(1), x(0)) * 180.0 / std::numbers::pi;
-  // Half round the Earth is as far as there is.
-  return Direct(frame_origin, azimuth_deg, std::min(distance_m, 2e7));
-}
-
-std::optional<std::size_t> TrackHistory::NewestAtOrBefore(Time t) const {
-  // The usual question is about now or later.
-  if (empty()) return std::nullopt;
-  if (newest().time <= t) return size() - 1;
-  std::size_t low = 0;  // Points below are at or before t.
-  std::size_t high = size() - 1;
-  while (low < high) {
-    const std::size_t middle = low + (high - low) / 2;
-    if ((*this)[middle].time <= t) {
-      low = middle + 1;
-    } else {
-      high = middle;
-    }
-  }
-  if (low == 0) return std::nullopt;
-  return low - 1;
+void Contact::Restore(const StoredContact& stored,
+                      const ContactClassTable& classes) {
+  for (const ContactPoint& point : stored.older) older_.Append(point);
+  for (const ContactPoint& point : stored.estimates) Append(point, classes);
+  for (const RecentReport& recent : stored.recent) recent_.Append(recent);
 }
 
 Time Contact::LastTime() const {
@@ -73,27 +27,61 @@ Time Contact::LastTime() const {
   return recent_.empty() ? last : std::max(last, recent_.newest().report.time);
 }
 
+std::size_t Contact::After(std::size_t index,
+                           const ContactClassTable& classes) const {
+  const ContactPoint& from = (*this)[index];
+  std::size_t after = index + 1;
+  // What a fix overwrote is in no later estimate.
+  while (!IsFixAlone((*this)[after]) && after + 1 < size()) {
+    const ContactPoint& next = (*this)[after + 1];
+    if (!GoesOn(from, next) || IsFixAlone(next) ||
+        !MaySkip(from, next, classes)) {
+      break;
+    }
+    ++after;
+  }
+  return after;
+}
+
 ContactPoint Contact::Smoothed(std::size_t index,
                                const ContactClassTable& classes) const {
-  std::size_t last = index;
-  while (last + 1 < history_.size() && last - index < kSmoothedAhead &&
-         GoesOn(history_[last], history_[last + 1])) {
-    ++last;
+  // A fix is the truth: another after it says nothing more of it.
+  const auto goes_on = [this](std::size_t i) {
+    return i + 1 < size() && GoesOn((*this)[i], (*this)[i + 1]) &&
+           !(IsFixAlone((*this)[i]) && IsFixAlone((*this)[i + 1]));
+  };
+  std::array<std::size_t, kSmoothedAhead + 1> steps;
+  std::size_t count = 0;
+  steps[0] = index;
+  while (count < kSmoothedAhead && goes_on(steps[count])) {
+    steps[count + 1] = steps[count] + 1;
+    ++count;
   }
-  ContactPoint smoothed = history_[last];
-  while (last > index) {
-    --last;
-    smoothed = SmoothedBy(history_[last], smoothed, classes);
+  if (count == kSmoothedAhead) {
+    count = 0;
+    while (count < kSmoothedAhead && goes_on(steps[count])) {
+      steps[count + 1] = After(steps[count], classes);
+      ++count;
+    }
+  }
+  ContactPoint smoothed = (*this)[steps[count]];
+  while (count > 0) {
+    const bool apart = IsFixAlone((*this)[steps[count]]);
+    smoothed = SmoothedBy((*this)[steps[--count]], smoothed, apart, classes);
   }
   return smoothed;
 }
 
 std::optional<ContactPoint> Contact::At(
     Time t, const ContactClassTable& classes) const {
-  const std::optional<std::size_t> index = history_.NewestAtOrBefore(t);
-  if (!index.has_value()) {
-    if (history_.empty()) return std::nullopt;
-    const ContactPoint& oldest = history_[0];
+  if (history_.empty()) return std::nullopt;
+  std::size_t index = 0;
+  if (const auto newer = history_.NewestAtOrBefore(t)) {
+    index = older_.size() + *newer;
+  } else if (const auto older = older_.NewestAtOrBefore(t)) {
+    index = *older;
+  } else {
+    const ContactPoint& oldest = (*this)[0];
     // What came before the oldest kept estimate is forgotten here; that there
     // was a contact is not.
     if (t < oldest.track_start) return std::nullopt;
@@ -102,11 +90,12 @@ std::optional<ContactPoint> Contact::At(
     point.report_time = t;
     return point;
   }
-  const ContactPoint& base = history_[*index];
+  const ContactPoint& base = (*this)[index];
   if (base.status == ContactStatus::kDropped) return std::nullopt;
   ContactPoint point = PredictPoint(base, t, classes);
-  if (*index + 1 < history_.size() && GoesOn(base, history_[*index + 1])) {
-    return SmoothedBy(point, Smoothed(*index + 1, classes), classes);
+  if (index + 1 < size() && GoesOn(base, (*this)[index + 1])) {
+    return SmoothedBy(point, Smoothed(index + 1, classes),
+                      IsFixAlone((*this)[index + 1]), classes);
   }
   const double stale_after_s =
       classes[static_cast<std::size_t>(base.contact_class)].stale_after_s;
@@ -132,7 +121,7 @@ ContactEstimate Contact::Named(const ContactPoint& point) const {
 }
 
 StoredContact Contact::ToStored() const {
-  StoredContact stored{.key = key_, .estimates = {}, .recent = {}, .links = {}};
+  StoredContact stored{.key = key_, .estimates = {}, .recent = {}};
   if (links_ != nullptr) stored.links = *links_;
   stored.estimates.reserve(history_.size());
   for (std::size_t i = 0; i < history_.size(); ++i) {
@@ -144,46 +133,11 @@ StoredContact Contact::ToStored() const {
   for (std::size_t i = 0; i < recent_.size(); ++i) {
     stored.recent.push_back(recent_[i]);
   }
+  stored.older.reserve(older_.size());
+  for (std::size_t i = 0; i < older_.size(); ++i) {
+    stored.older.push_back(older_[i]);
+  }
   return stored;
-}
-
-ContactPoint InPlaneAt(const ContactPoint& point, const GeodeticPoint& origin) {
-  if (point.frame_origin == origin) return point;
-  const NedFrame from(point.frame_origin);
-  const NedFrame to(origin);
-  const GeodeticPoint place = point.Position();
-  const NedPoint there = to.ToNed(place);
-  // A direction is turned by the difference of what north is in both planes.
-  const double turn_rad =
-      to.NorthAzimuthRad(place) - from.NorthAzimuthRad(place);
-  const double c = std::cos(turn_rad);
-  const double s = std::sin(turn_rad);
-  Eigen::Matrix2d turn;
-  turn << c, -s, s, c;
-  Eigen::Matrix4d both = Eigen::Matrix4d::Zero();
-  both.topLeftCorner<2, 2>() = turn;
-  both.bottomRightCorner<2, 2>() = turn;
-  ContactPoint moved = point;
-  moved.frame_origin = origin;
-  moved.x.head<2>() = Eigen::Vector2d(there.north_m, there.east_m);
-  moved.x.tail<2>() = turn * Eigen::Vector2d(point.x.tail<2>());
-  const Eigen::Matrix4d turned = both * point.P * both.transpose();
-  moved.P = 0.5 * (turned + turned.transpose());
-  return moved;
-}
-
-ContactPoint PredictPoint(const ContactPoint& point, Time t,
-                          const ContactClassTable& classes) {
-  ContactPoint predicted = point;
-  predicted.time = t;
-  if (t == point.time) return predicted;
-  const double q = classes[static_cast<std::size_t>(point.contact_class)]
-                       .process_noise_m2_s3;
-  const TrackState state =
-      Predict({.x = point.x, .P = point.P}, ToSeconds(t - point.time), q);
-  predicted.x = state.x;
-  predicted.P = state.P;
-  return predicted;
 }
 
 }  // namespace fathom::map

@@ -9,19 +9,17 @@
 //
 // The past between reports is smoothed, not extrapolated (Rauch, Tung, Striebel
 // 1965, "Maximum likelihood estimates of linear dynamic systems", AIAA J. 3(8),
-// 1445-1450): it grows surer as reports come in after it.
+// 1445-1450): it grows surer as reports come in after it. Back to the newest
+// kRecentEstimates by each of them, before by some of them (track_history.h).
 //
-// Each estimate lives in the north-east plane of its own frame_origin: the
-// place of the first report, moved along when the contact has gone further
-// than kReanchorM, or of the last fix. Everything is doubles, so that storing
-// and restoring gives the same answers, bit for bit.
+// Everything is doubles, so that storing and restoring gives the same answers,
+// bit for bit.
 //
 // A Contact is immutable once published in a ContactsView; thread-safe.
 
 #ifndef FATHOM_MAP_CONTACTS_CONTACT_H_
 #define FATHOM_MAP_CONTACTS_CONTACT_H_
 
-#include <Eigen/Core>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -32,58 +30,14 @@
 
 #include "base/time.h"
 #include "map/contacts/contact_class.h"
+#include "map/contacts/contact_point.h"
 #include "map/contacts/contact_report.h"
 #include "map/contacts/shared_log.h"
+#include "map/contacts/track_history.h"
 #include "map/geodesy/ids.h"
 #include "map/geodesy/points.h"
 
 namespace fathom::map {
-
-// The numbers are those of fathom.v1.ContactStatus; stored: never reuse one.
-enum class ContactStatus : std::uint8_t {
-  kNew = 1,      // Reported once; its velocity is not yet known.
-  kActive = 2,   // Tracked.
-  kStale = 3,    // Silent too long; still predicted. Never stored.
-  kDropped = 4,  // Gone; only its history answers.
-};
-
-// Estimates kept per contact; older ones are in the mission file only.
-inline constexpr std::size_t kRecentEstimates = 256;
-
-// A contact's plane is laid anew when the contact is further than this from
-// its origin: lengths on the plane are short by 0.5 m there.
-inline constexpr double kReanchorM = 50'000;
-
-// The motion and size of a contact at one time, without its name.
-struct ContactPoint {
-  ContactClass contact_class = ContactClass::kUnknown;
-  ContactStatus status = ContactStatus::kNew;
-  // The moment that the estimate is for.
-  Time time;
-  // The last report behind it; equals `time` in what is stored.
-  Time report_time;
-  // The first report of this life of the contact.
-  Time track_start;
-  // Where the plane of x and P touches the Earth.
-  GeodeticPoint frame_origin;
-  // [n, e, vn, ve], metres and m/s, and covariance; P symmetric.
-  Eigen::Vector4d x = Eigen::Vector4d::Zero();
-  Eigen::Matrix4d P = Eigen::Matrix4d::Zero();
-  // The depths it occupies below the mission's datum (0: from the surface),
-  // and 1 sigma of both together; 0 where they go by class.
-  double top_depth_m = 0;
-  double keel_depth_m = 0;
-  double depth_std_m = 0;
-  // Radius of the disc that holds it.
-  double radius_m = 0;
-  // Reports fused in this life.
-  std::uint64_t report_count = 0;
-
-  // Where x is, on the Earth; sound at any distance from the origin.
-  GeodeticPoint Position() const;
-
-  friend bool operator==(const ContactPoint&, const ContactPoint&) = default;
-};
 
 // A contact's estimate with its name: what is told, stored and restored.
 struct ContactEstimate : ContactPoint {
@@ -93,14 +47,6 @@ struct ContactEstimate : ContactPoint {
 
   friend bool operator==(const ContactEstimate&,
                          const ContactEstimate&) = default;
-};
-
-// The newest estimates of one contact, oldest first, at most kRecentEstimates.
-class TrackHistory : public SharedLog<ContactPoint, kRecentEstimates> {
- public:
-  // Index of the newest point with time <= t; nullopt if all are later. Of
-  // several at t the last. O(log size).
-  std::optional<std::size_t> NewestAtOrBefore(Time t) const;
 };
 
 // Late reports are taken if they are not older than this beside the newest
@@ -137,8 +83,8 @@ struct ContactLinks {
 };
 
 // A contact as stored: its newest estimates, oldest first, 1 to
-// kRecentEstimates of them (of more, the newest are taken), and the reports of
-// late behind them.
+// kRecentEstimates of them (of more, the newest are taken), the reports of
+// late behind them, and those kept of the estimates before.
 struct StoredContact {
   ContactKey key;
   // Without `linked`: see links.
@@ -146,6 +92,9 @@ struct StoredContact {
   // In order of time, at most kRecentReports.
   std::vector<RecentReport> recent;
   std::optional<ContactLinks> links = std::nullopt;
+  // In order of time, not later than estimates, at most kOlderEstimates. Of a
+  // mission of an older format there are none.
+  std::vector<ContactPoint> older = {};
 };
 
 // See file comment.
@@ -156,6 +105,8 @@ class Contact {
   const ContactKey& key() const { return key_; }
   // Never empty in a published contact.
   const TrackHistory& history() const { return history_; }
+  // What is kept of the estimates before.
+  const OlderEstimates& older() const { return older_; }
   // The estimate after the newest report, or the marker of its drop.
   const ContactPoint& newest() const { return history_.newest(); }
   bool dropped() const { return newest().status == ContactStatus::kDropped; }
@@ -170,10 +121,12 @@ class Contact {
 
   // The contact at `t`. After the newest estimate: that one predicted on;
   // kStale if silent too long. Between two of one life: smoothed, that is by
-  // what was heard before and after (at most kSmoothedAhead estimates after).
-  // Absent before the first report and from a drop to the next report. Before
-  // the oldest estimate that is kept, if that life was running: predicted
-  // back from it. O(log kept); the past up to 15 us.
+  // what was heard before and after (at most kSmoothedAhead estimates after);
+  // of `older` its report_time and report_count are those of the one kept
+  // before. Absent before the first report and from a drop to the next report.
+  // Before the oldest estimate that is kept, if that life was running (a
+  // mission of an older format, or hundreds of lives): predicted back from it.
+  // O(log kept); the past up to 15 us.
   std::optional<ContactPoint> At(Time t,
                                  const ContactClassTable& classes) const;
 
@@ -187,35 +140,42 @@ class Contact {
   StoredContact ToStored() const;
 
   // For the holder (ContactSet).
-  TrackHistory& history() { return history_; }
+  void Append(const ContactPoint& point, const ContactClassTable& classes);
+  // Keeps the oldest `size` of history() only.
+  void Truncate(std::size_t size);
+  // REQUIRES: nothing is held; as StoredContact says.
+  void Restore(const StoredContact& stored, const ContactClassTable& classes);
   RecentReports& recent() { return recent_; }
   void set_links(std::shared_ptr<const ContactLinks> links) {
     links_ = std::move(links);
   }
 
  private:
-  // What is believed of history_[index] after up to kSmoothedAhead later ones
+  // All estimates in memory, oldest first.
+  std::size_t size() const { return older_.size() + history_.size(); }
+  const ContactPoint& operator[](std::size_t index) const {
+    return index < older_.size() ? older_[index]
+                                 : history_[index - older_.size()];
+  }
+  // The estimate after (*this)[index] that smoothing steps to. REQUIRES: there
+  // is one of the same life.
+  std::size_t After(std::size_t index, const ContactClassTable& classes) const;
+  // What is believed of (*this)[index] after up to kSmoothedAhead later ones
   // of the same life, in its own plane.
   ContactPoint Smoothed(std::size_t index,
                         const ContactClassTable& classes) const;
 
   ContactKey key_;
+  OlderEstimates older_;
   TrackHistory history_;
   RecentReports recent_;
   std::shared_ptr<const ContactLinks> links_;
 };
 
-// What lies further ahead than so many estimates does not help the past.
+// Estimates ahead that the past is smoothed by. Where there are more of the
+// same life, those that may be skipped without loss are: else so many would
+// reach less far than they help where reports are frequent and vague.
 inline constexpr std::size_t kSmoothedAhead = 32;
-
-// The point in a plane that touches the Earth at `origin`: the same place,
-// velocity and uncertainty. REQUIRES: within 3000 km of it.
-ContactPoint InPlaneAt(const ContactPoint& point, const GeodeticPoint& origin);
-
-// The point moved on (or back) to `t` under its class's process noise;
-// `time` becomes t, the rest stays.
-ContactPoint PredictPoint(const ContactPoint& point, Time t,
-                          const ContactClassTable& classes);
 
 }  // namespace fathom::map
 

@@ -77,15 +77,15 @@ ContactOutcome ContactMap::BeginAs(const ContactReport& report,
   const Contact* held = set_->Get(report.key);
   if (held == nullptr) {
     auto contact = std::make_shared<Contact>(report.key);
-    contact->history().Append(point);
+    contact->Append(point, options_->classes);
     none_stale_until_ = std::min(none_stale_until_, StaleFrom(point));
     Own().Add(std::move(contact));
   } else if (held->LastTime() > time) {
     outcome.reason = RejectReason::kTooLate;
     return outcome;
   } else {
-    Change(report.key, ContactChange::kAppend, [&point](Contact& contact) {
-      contact.history().Append(point);
+    Change(report.key, ContactChange::kAppend, [&](Contact& contact) {
+      contact.Append(point, options_->classes);
       contact.recent() = {};
     });
   }

@@ -1,5 +1,6 @@
 #include "map/contacts/contact_map.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <functional>
 #include <utility>
@@ -31,6 +32,33 @@ std::size_t PointsOf(const RecentReports& recent) {
 bool HoldsAll(const Contact& held) {
   return PointsOf(held.recent()) == held.history().size() &&
          held.recent().size() < kRecentReports;
+}
+
+// Finite numbers may still lie beyond the Earth, where places are NaN.
+bool IsEstimate(const ContactPoint& point) {
+  return IsContactClass(point.contact_class) && IsFinite(point) &&
+         ValidateGeodetic(point.Position()).ok();
+}
+
+// Whether the covariance is one, but for rounding.
+bool IsCovariance(const Eigen::Matrix4d& P) {
+  Eigen::Matrix4d raised = P;
+  raised.diagonal() *= 1 + 1e-6;
+  return P == P.transpose() && raised.llt().info() == Eigen::Success;
+}
+
+bool AreOlderEstimates(const std::vector<ContactPoint>& older,
+                       const ContactPoint& oldest_newer) {
+  if (older.size() > kOlderEstimates) return false;
+  for (std::size_t i = 0; i < older.size(); ++i) {
+    const ContactPoint& next =
+        i + 1 < older.size() ? older[i + 1] : oldest_newer;
+    if (!IsEstimate(older[i]) || !IsCovariance(older[i].P) ||
+        older[i].time > next.time || older[i].track_start > older[i].time) {
+      return false;
+    }
+  }
+  return true;
 }
 
 }  // namespace
@@ -148,7 +176,7 @@ ContactOutcome ContactMap::ApplyFirst(const ContactReport& report,
   }
   if (outcome.reason.has_value()) return outcome;
   auto contact = std::make_shared<Contact>(report.key);
-  contact->history().Append(step.points[0]);
+  contact->Append(step.points[0], options_->classes);
   contact->recent().Append(Remembered(report, step));
   outcome.applied = true;
   outcome.estimate = contact->NewestEstimate();
@@ -215,7 +243,7 @@ ContactOutcome ContactMap::ApplyNext(const Contact& held,
                                         : ContactChange::kRevise;
     Change(report.key, kind, [&](Contact& contact) {
       for (std::size_t i = 0; i < step.count; ++i) {
-        contact.history().Append(step.points[i]);
+        contact.Append(step.points[i], options_->classes);
         outcome.estimates.push_back(contact.Named(step.points[i]));
       }
       contact.recent().Append(Remembered(report, step));
@@ -283,8 +311,10 @@ ContactOutcome ContactMap::ApplyLate(const Contact& held,
     }
   }
   Change(report.key, ContactChange::kRevise, [&](Contact& contact) {
-    contact.history().Truncate(points);
-    for (const ContactPoint& point : made) contact.history().Append(point);
+    contact.Truncate(points);
+    for (const ContactPoint& point : made) {
+      contact.Append(point, options_->classes);
+    }
     contact.recent().Truncate(kept);
     for (RecentReport& one : taken) contact.recent().Append(std::move(one));
   });
@@ -310,8 +340,8 @@ ContactOutcome ContactMap::Drop(const ContactKey& named, Time time) {
   outcome.estimate = held->Named(point);
   outcome.estimates = {*outcome.estimate};
   outcome.joint = held->links() != nullptr;
-  Change(key, ContactChange::kAppend, [&point](Contact& contact) {
-    contact.history().Append(point);
+  Change(key, ContactChange::kAppend, [&](Contact& contact) {
+    contact.Append(point, options_->classes);
     contact.recent() = {};
   });
   return outcome;
@@ -334,15 +364,12 @@ absl::Status ContactMap::Restore(StoredContact stored) {
   for (std::size_t i = 0; i < stored.estimates.size(); ++i) {
     const ContactEstimate& estimate = stored.estimates[i];
     if (estimate.key != stored.key) return invalid("an estimate of another");
-    // Finite numbers may still lie beyond the Earth, where places are NaN.
-    if (!IsContactClass(estimate.contact_class) || !IsFinite(estimate) ||
-        !ValidateGeodetic(estimate.Position()).ok()) {
+    if (!IsEstimate(estimate)) {
       return invalid("an estimate is not finite, nowhere, or has no class");
     }
     if (i > 0 && estimate.time < stored.estimates[i - 1].time) {
       return invalid("estimates are not in order of time");
     }
-    contact->history().Append(estimate);
   }
   for (std::size_t i = 0; i < stored.recent.size(); ++i) {
     const RecentReport& recent = stored.recent[i];
@@ -351,8 +378,11 @@ absl::Status ContactMap::Restore(StoredContact stored) {
         (i > 0 && recent.report.time < stored.recent[i - 1].report.time)) {
       return invalid("a recent report is malformed or out of order");
     }
-    contact->recent().Append(recent);
   }
+  if (!AreOlderEstimates(stored.older, stored.estimates.front())) {
+    return invalid("its older estimates are not in order, or are none");
+  }
+  contact->Restore(stored, options_->classes);
   if (PointsOf(contact->recent()) > contact->history().size()) {
     return invalid("more came of its recent reports than it holds");
   }

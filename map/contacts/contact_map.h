@@ -118,7 +118,8 @@ class ContactMap {
 
   // Puts a stored contact back. Errors: ALREADY_EXISTS (its key is held),
   // INVALID_ARGUMENT (no estimates, not in order of time, not finite, keys
-  // that differ, links that are none), RESOURCE_EXHAUSTED (beyond max_contacts
+  // that differ, links that are none, a covariance of an older estimate that is
+  // none), RESOURCE_EXHAUSTED (beyond max_contacts
   // live ones).
   absl::Status Restore(StoredContact stored);
 

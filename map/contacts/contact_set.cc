@@ -60,12 +60,14 @@ const Contact& ContactSet::Change(const Place& place, ContactChange kind,
     held.contact = std::make_shared<Contact>(*held.contact);
     held.epoch = epoch;
   }
+  const std::size_t older = held.contact->older().size();
   change(*held.contact);
   if (kind == ContactChange::kReports && entry.has_value()) {
     entry->contact = held.contact.get();
   } else {
-    if (kind != ContactChange::kAppend) entry.reset();
-    entry = MakeSpatialEntry(*held.contact, *classes, entry);
+    if (held.contact->older().size() < older) entry.reset();
+    entry = MakeSpatialEntry(*held.contact, *classes, entry,
+                             kind == ContactChange::kAppend);
   }
   index.Replace(before.get(), held.code, *entry, epoch);
   held.code = entry->code;
@@ -76,7 +78,8 @@ const Contact& ContactSet::Change(const Place& place, ContactChange kind,
 
 void ContactSet::Add(std::shared_ptr<Contact> contact) {
   const Place place = Find(contact->key());
-  const SpatialEntry entry = MakeSpatialEntry(*contact, *classes, std::nullopt);
+  const SpatialEntry entry =
+      MakeSpatialEntry(*contact, *classes, std::nullopt, false);
   index.Insert(entry, epoch);
   ++size;
   if (!contact->dropped()) ++live_count;

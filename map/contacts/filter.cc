@@ -211,6 +211,18 @@ double PositionNis(FilterKind kind, const TrackState& state,
   return innovation.dot(S.inverse() * innovation);
 }
 
+TrackState Fuse(const TrackState& a, const TrackState& b) {
+  // Joseph's form with gain K = P_a (P_a + P_b)^-1.
+  const Eigen::Matrix4d sum = a.P + b.P;
+  const Eigen::Matrix4d K = sum.ldlt().solve(a.P).transpose();
+  const Eigen::Matrix4d rest = Eigen::Matrix4d::Identity() - K;
+  TrackState fused;
+  fused.x = a.x + K * (b.x - a.x);
+  fused.P = rest * a.P * rest.transpose() + K * b.P * K.transpose();
+  Symmetrize(fused.P);
+  return fused;
+}
+
 TrackState SmoothBack(const TrackState& state, double dt_s,
                       const TrackState& predicted, const TrackState& smoothed) {
   // Gain P F' (predicted P)^-1, transposed.

@@ -133,6 +133,10 @@ UpdatedState Update(FilterKind kind, const TrackState& state,
 double PositionNis(FilterKind kind, const TrackState& state,
                    const PositionMeasurement& measurement);
 
+// Two estimates of one state that owe nothing to each other, as one. REQUIRES:
+// the sum of their P positive definite.
+TrackState Fuse(const TrackState& a, const TrackState& b);
+
 // One step back of a fixed-interval smoother (Rauch, Tung, Striebel 1965): the
 // estimate `state`, dt_s >= 0 before a later one of which `predicted` was
 // foretold from it (Predict by dt_s) and `smoothed` is believed now.

@@ -52,8 +52,10 @@ double GreatestStd(const Eigen::Matrix4d& P, int first) {
   return std::sqrt(mean + Length(half, P(first, first + 1)));
 }
 
-// After how many reports the reach into the past is made afresh.
+// After how many reports the reach into the past is made afresh, over the
+// newest estimates and over the older ones.
 constexpr std::uint64_t kAfresh = 32;
+constexpr std::uint64_t kOlderAfresh = 512;
 
 // A little more than the value, to cover the rounding to float.
 float Above(double value) { return static_cast<float>(value * 1.000001); }
@@ -108,37 +110,43 @@ double ReachUntil(const ContactPoint& point, const Reach& reach,
   return kSmoothedReach * reach.After(span_s) + kSmoothedDraw * draw_m;
 }
 
-// How far from `place`, the newest, the contact may have been at any time
-// before: each estimate is asked until the next one came, the oldest also
-// back to the start of its life.
-double PastAfresh(const TrackHistory& history, const UnitVector& place,
+// How far from `newest`, which is at `place`, the contact may have been until
+// `next` came after `point`. `back`: and before it, back to the start of its
+// life.
+double PastOf(const ContactPoint& point, const ContactPoint* next, bool back,
+              const ContactPoint& newest, const UnitVector& place,
+              const ContactClassTable& classes) {
+  const Reach reach = ReachOf(point, classes);
+  double reach_m = next == nullptr ? 0 : ReachUntil(point, reach, *next);
+  if (back) {
+    reach_m = std::max(reach_m,
+                       reach.After(ToSeconds(point.time - point.track_start)));
+  }
+  // On one plane the difference will do (1.1: what the plane shortens).
+  return reach_m +
+         (point.frame_origin == newest.frame_origin
+              ? 1.1 * Length(point.x(0) - newest.x(0), point.x(1) - newest.x(1))
+              : DistanceM(place, ToUnitVector(point.Position())));
+}
+
+// SpatialBounds::past_m: each estimate is asked until the next one came.
+double PastAfresh(const Contact& contact, const UnitVector& place,
                   const ContactClassTable& classes) {
-  const ContactPoint& newest = history.newest();
+  const TrackHistory& history = contact.history();
   double past_m = 0;
   for (std::size_t i = 0; i < history.size(); ++i) {
-    const ContactPoint& point = history[i];
-    double reach_m = 0;
-    if (i + 1 < history.size()) {
-      reach_m = ReachUntil(point, ReachOf(point, classes), history[i + 1]);
-    }
-    if (i == 0) {
-      const double back_s = ToSeconds(point.time - point.track_start);
-      reach_m = std::max(reach_m, ReachOf(point, classes).After(back_s));
-    }
-    // On one plane the difference will do (1.1: what the plane shortens).
-    const double distance_m =
-        point.frame_origin == newest.frame_origin
-            ? 1.1 * Length(point.x(0) - newest.x(0), point.x(1) - newest.x(1))
-            : DistanceM(place, ToUnitVector(point.Position()));
-    past_m = std::max(past_m, distance_m + reach_m);
+    const ContactPoint* const next =
+        i + 1 < history.size() ? &history[i + 1] : nullptr;
+    const bool back = i == 0 && contact.older().empty();
+    past_m = std::max(past_m, PastOf(history[i], next, back, history.newest(),
+                                     place, classes));
   }
   return past_m;
 }
 
 // The same from the entry before the newest estimate came, at least as wide.
 double PastFrom(const TrackHistory& history, const SpatialEntry& before,
-                const UnitVector& place) {
-  const double moved_m = DistanceM(place, before.bounds.low);
+                double moved_m) {
   const ContactPoint& last = history[history.size() - 2];
   // What ReachOf(last) said, rounded up; of a drop, where it is nowhere, 0.
   const Reach reach{.base_m = before.bounds.base_m,
@@ -146,6 +154,28 @@ double PastFrom(const TrackHistory& history, const SpatialEntry& before,
                     .wander_m_s15 = before.bounds.wander_m_s15};
   return moved_m + std::max(static_cast<double>(before.bounds.past_m),
                             ReachUntil(last, reach, history.newest()));
+}
+
+// SpatialBounds::older_m.
+double OlderAfresh(const Contact& contact, const UnitVector& place,
+                   const ContactClassTable& classes) {
+  const OlderEstimates& older = contact.older();
+  const TrackHistory& history = contact.history();
+  double older_m = 0;
+  for (std::size_t i = 0; i < older.size(); ++i) {
+    const ContactPoint& next = i + 1 < older.size() ? older[i + 1] : history[0];
+    older_m = std::max(older_m, PastOf(older[i], &next, i == 0,
+                                       history.newest(), place, classes));
+  }
+  return older_m;
+}
+
+// The same from the entry before, at least as wide. What became older is where
+// it was, and to pass over some moves the answer by much less than
+// kSmoothedReach allows (track_history.h).
+double OlderFrom(const SpatialEntry& before, double moved_m) {
+  return moved_m + static_cast<double>(
+                       std::max(before.bounds.past_m, before.bounds.older_m));
 }
 
 // ToUnitVector in single precision, within 1.6 m: half a unit of a longitude's
@@ -178,10 +208,12 @@ void SpatialBounds::Include(const SpatialBounds& other) {
   speed_m_s = std::max(speed_m_s, other.speed_m_s);
   wander_m_s15 = std::max(wander_m_s15, other.wander_m_s15);
   past_m = std::max(past_m, other.past_m);
+  older_m = std::max(older_m, other.older_m);
   least_wander_m_s15 = std::min(least_wander_m_s15, other.least_wander_m_s15);
   radius_m = std::max(radius_m, other.radius_m);
   oldest = std::min(oldest, other.oldest);
   newest = std::max(newest, other.newest);
+  all_since = std::max(all_since, other.all_since);
 }
 
 bool SpatialBounds::MayReach(const UnitVector& at, double reach_m,
@@ -199,6 +231,9 @@ bool SpatialBounds::MayReach(const UnitVector& at, double reach_m,
                        std::sqrt(dt_s) * static_cast<double>(wander_m_s15));
   }
   if (t < newest) within_m = std::max(within_m, static_cast<double>(past_m));
+  if (t < all_since) {
+    within_m = std::max(within_m, static_cast<double>(older_m));
+  }
   // 3 m: the rounding of the unit vectors.
   const double room_m = reach_m + within_m + 3.0;
   constexpr double kRadius2 =
@@ -215,7 +250,8 @@ bool SpatialBounds::MayReach(const UnitVector& at, double reach_m,
 
 SpatialEntry MakeSpatialEntry(const Contact& contact,
                               const ContactClassTable& classes,
-                              const std::optional<SpatialEntry>& before) {
+                              const std::optional<SpatialEntry>& before,
+                              bool appended) {
   const TrackHistory& history = contact.history();
   const ContactPoint& newest = history.newest();
   const GeodeticPoint place = newest.Position();
@@ -232,9 +268,18 @@ SpatialEntry MakeSpatialEntry(const Contact& contact,
     bounds.speed_m_s = Above(reach.speed_m_s);
     bounds.wander_m_s15 = Above(reach.wander_m_s15);
   }
-  bounds.past_m = Above(before.has_value() && newest.report_count % kAfresh != 0
-                            ? PastFrom(history, *before, bounds.low)
-                            : PastAfresh(history, bounds.low, classes));
+  const double moved_m =
+      before.has_value() ? DistanceM(bounds.low, before->bounds.low) : 0.0;
+  bounds.past_m =
+      Above(appended && before.has_value() && newest.report_count % kAfresh != 0
+                ? PastFrom(history, *before, moved_m)
+                : PastAfresh(contact, bounds.low, classes));
+  if (contact.older().empty()) return entry;
+  bounds.older_m =
+      Above(before.has_value() && newest.report_count % kOlderAfresh != 0
+                ? OlderFrom(*before, moved_m)
+                : OlderAfresh(contact, bounds.low, classes));
+  bounds.all_since = history[0].time;
   return entry;
 }
 

@@ -43,7 +43,8 @@ inline constexpr float kPlaneRadiusM = 5'700'000;
 // The region of space and time that one contact, or all below a node, may be
 // in. At a time t not before `newest` it is within
 //   base_m + speed_m_s dt + wander_m_s15 dt^1.5,  dt = t - oldest,
-// of the box; at any earlier time within past_m.
+// of the box; at an earlier time within past_m; at one before `all_since`
+// within the greater of past_m and older_m.
 struct SpatialBounds {
   UnitVector low = {2, 2, 2};
   UnitVector high = {-2, -2, -2};
@@ -53,8 +54,9 @@ struct SpatialBounds {
   float speed_m_s = 0;
   // kNearSigmas sqrt(q / 3).
   float wander_m_s15 = 0;
-  // Over the whole history that is kept.
+  // Over the newest estimates, that is Contact::history; over those before.
   float past_m = 0;
+  float older_m = 0;
   // The least wander and the greatest radius of what is inside: after long
   // silence it is too vague to matter anywhere (kVanishing).
   float least_wander_m_s15 = std::numeric_limits<float>::infinity();
@@ -62,6 +64,8 @@ struct SpatialBounds {
   // Earliest and latest newest estimate.
   Time oldest = Time::max();
   Time newest = Time::min();
+  // Latest begin of the newest estimates of one that has older ones.
+  Time all_since = Time::min();
 
   void Include(const SpatialBounds& other);
   // Whether something in it may at `t` be within reach_m of `at`.
@@ -76,12 +80,15 @@ struct SpatialEntry {
   SpatialBounds bounds;
 };
 
-// The entry for a contact. `before`: its entry before its newest estimate was
-// appended, if it had one: from it the new one follows in O(1), a little
-// wider; every 32nd report it is made afresh in O(estimates kept).
+// The entry for a contact. `before`: its entry before its newest estimates
+// came, if it had one and no older estimate was let go since. `appended`: one
+// came, and nothing else changed; what is said of the newest estimates then
+// follows from `before` in O(1), a little wider, but every 32nd time. What is
+// said of the older ones does, but every 512th time. Else O(estimates kept).
 SpatialEntry MakeSpatialEntry(const Contact& contact,
                               const ContactClassTable& classes,
-                              const std::optional<SpatialEntry>& before);
+                              const std::optional<SpatialEntry>& before,
+                              bool appended);
 
 class SpatialIndex {
  public:

@@ -87,6 +87,9 @@ void AddContact(const Contact& contact, Digest64& digest) {
   for (std::size_t i = 0; i < history.size(); ++i) {
     AddPoint(history[i], digest);
   }
+  for (std::size_t i = 0; i < contact.older().size(); ++i) {
+    AddPoint(contact.older()[i], digest);
+  }
   for (std::size_t i = 0; i < contact.recent().size(); ++i) {
     const RecentReport& recent = contact.recent()[i];
     digest.Add(

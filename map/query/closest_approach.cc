@@ -130,16 +130,19 @@ std::optional<Approach> ClosestApproach(const Contact& contact,
                                         const ApproachQuestion& question) {
   // The times at which one of the two may turn.
   std::vector<TimedPlace> places;
-  const TrackHistory& history = contact.history();
-  for (std::size_t leg = 0; leg + 1 < path.size(); ++leg) {
-    places.push_back(path[leg]);
-    for (std::size_t i = 0; i < history.size(); ++i) {
-      const Time time = history[i].time;
+  const auto turn_on = [&](std::size_t leg, const auto& estimates) {
+    for (std::size_t i = 0; i < estimates.size(); ++i) {
+      const Time time = estimates[i].time;
       if (time > path[leg].time && time < path[leg + 1].time &&
           time > places.back().time) {
         places.push_back({Between(path[leg], path[leg + 1], time), time});
       }
     }
+  };
+  for (std::size_t leg = 0; leg + 1 < path.size(); ++leg) {
+    places.push_back(path[leg]);
+    turn_on(leg, contact.older());
+    turn_on(leg, contact.history());
   }
   places.push_back(path.back());
 

@@ -70,6 +70,23 @@ int CheckContactLimits(const nlohmann::json& report) {
   }
   missed += held.Report();
 
+  // Told too wide is no harm; too narrow is.
+  Limit bold("contacts: points below 50, 90, 99 %, 1 to 60 min ago", 3);
+  Limit wide("contacts: points above 50, 90, 99 %, 1 to 60 min ago", 15);
+  Limit past_nees("contacts: mean NEES, 1 to 60 min ago", 4.5731);
+  for (const auto& row : rows("contact_past")) {
+    const std::string where =
+        Where(row) + " minutes_ago=" + row["minutes_ago"].dump();
+    past_nees.Offer(row["nees"], where);
+    for (const int share : {50, 90, 99}) {
+      const double percent =
+          row["within_" + std::to_string(share) + "_percent"];
+      bold.Offer(share - percent, where);
+      wide.Offer(percent - share, where);
+    }
+  }
+  missed += bold.Report() + wide.Report() + past_nees.Report();
+
   Limit out("thesis run: percent of errors beyond 3 std", 1);
   Limit falls("thesis run: rms error after 15 min over that after 1", 0.9999);
   Limit slower("thesis run: rms error, noise over twice the noise", 0.9999);

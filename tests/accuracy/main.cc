@@ -138,6 +138,7 @@ int Run(int argc, char** argv) {
           {"contact_consistency", ContactConsistencyFigures},
           {"contact_optimum", ContactOptimumFigures},
           {"contact_prediction", ContactPredictionFigures},
+          {"contact_past", ContactPastFigures},
           {"contact_thesis", ThesisContactFigures},
           {"contact_recorded",
            [&] { return RecordedContactFigures(data + "/contacts"); }},

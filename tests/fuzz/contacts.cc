@@ -72,7 +72,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes,
                                       std::size_t size) {
   if (size == 0) return 0;
   const fathom::storage::ByteSpan payload(bytes + 1, size - 1);
-  switch (bytes[0] % 7) {
+  switch (bytes[0] % 8) {
     case 0:
       fathom::fuzz::FuzzEstimate(payload, 1);
       break;
@@ -90,6 +90,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes,
       break;
     case 5:
       fathom::fuzz::FuzzContact(payload, 3);
+      break;
+    case 7:
+      fathom::fuzz::FuzzContact(payload, 4);
       break;
     default:
       fathom::fuzz::FuzzHistory(payload);

@@ -110,6 +110,12 @@ void WriteStorageSeeds(Seeds& seeds) {
         linked.links = map::ContactLinks{.since = {}, .names = names};
         seeds.WriteBlob("contacts", "linked-contact", 5,
                         storage::EncodeContact(linked));
+        // The first of its estimates as older ones.
+        map::StoredContact older = linked;
+        older.older.assign(older.estimates.begin(),
+                           older.estimates.begin() + 1);
+        seeds.WriteBlob("contacts", "older-contact", 7,
+                        storage::EncodeContact(older));
       },
       [](const map::ContactKey&) {});
   map::StoredActivity activity;

@@ -15,7 +15,7 @@ import unittest
 import grpc
 
 from live_server import (DEADLINE_S, START_S, LiveTest, ask, at, fix_report,
-                         ingest, obstacle, point, report_contacts, types)
+                         ingest, mission, obstacle, point, report_contacts, types)
 
 # The radar's frame (contacts/autoferry/README.md).
 PIREN = (63.4389029083, 10.39908278)
@@ -273,6 +273,88 @@ class LinkedNames(LiveTest):
             self.assertEqual(rejection.reason, types.REJECT_REASON_BAD_LINK)
             self.assertIn("none of those named is live",
                           rejection.description)
+
+
+class PastOfHours(LiveTest):
+    """Where a ship was an hour ago, among thousands of reports since."""
+
+    def test_is_smoothed_and_the_same_after_restarts(self):
+        # North at 0.5 m/s, weaving east and west by 100 m in half an hour; heard
+        # every 2 s from 3 km off for 80 minutes, gone from 20 to 25.
+        draw = random.Random(8)
+
+        def true_m(second):
+            return 0.5 * second, 100 * math.sin(2 * math.pi * second / 1800)
+        seconds = [s for s in range(0, 4801, 2) if not 1200 < s < 1500]
+        reports = []
+        for second in seconds:
+            north_m, east_m = true_m(second)
+            report = fix_report(1, second=second)
+            seen = report.range_bearing
+            seen.pose.position.CopyFrom(point(north_m, east_m - 3000))
+            seen.range_m = 3000 + draw.gauss(0, 10)
+            seen.bearing_deg = 90 + draw.gauss(0, 1)
+            seen.range_std_m, seen.bearing_std_deg = 10, 1
+            reports.append(report)
+        asked = [s for s in range(100, 4800, 61) if not 1200 < s < 1500]
+
+        def there(server, second):
+            return list(server.obstacle.ListContacts(
+                obstacle.ListContactsRequest(time=at(second)),
+                timeout=DEADLINE_S).contacts)
+
+        def check(server):
+            answers = []
+            within = 0
+            for second in asked:
+                [estimate] = there(server, second)
+                north_m, east_m = true_m(second)
+                place = point(north_m, east_m)
+                off_m = (
+                    (estimate.position.latitude_deg - place.latitude_deg)
+                    * 111_060,
+                    (estimate.position.longitude_deg - place.longitude_deg)
+                    * 83_500)
+                # The upper triangle, row by row.
+                nn, ne, _, _, ee = estimate.covariance[:5]
+                squared = (ee * off_m[0]**2 - 2 * ne * off_m[0] * off_m[1]
+                           + nn * off_m[1]**2) / (nn * ee - ne * ne)
+                within += squared < 9.21  # 99 % of two dimensions.
+                # An hour ago and more as sure as the noise allows.
+                self.assertLess(math.sqrt(max(nn, ee)), 40, second)
+                answers.append(estimate)
+            self.assertGreater(within, 0.93 * len(asked))
+            hits = [ask(server, *true_m(second), depth_m=1.0, second=second)
+                    .answer for second in asked[:20]]
+            for hit in hits:
+                self.assertEqual(hit.contacts[0].contact_id, "ship")
+                self.assertGreater(hit.contacts[0].probability, 0.5)
+            # Half a mile beside it there was nothing.
+            for second in asked[:20]:
+                north_m, east_m = true_m(second)
+                self.assertEqual(
+                    len(ask(server, north_m, east_m + 900, depth_m=1.0,
+                            second=second).answer.contacts), 0)
+            self.assertEqual(there(server, 1400), [])
+            return answers, [hit.SerializeToString() for hit in hits]
+
+        with self.new_mission() as server:
+            split = seconds.index(1200) + 1
+            self.assertEqual(stream(server, reports[:split]), [])
+            server.mission.DropContact(
+                mission.DropContactRequest(source_id="c4i", contact_id="ship",
+                                           time=at(1201)), timeout=DEADLINE_S)
+            self.assertEqual(stream(server, reports[split:], first=split + 1),
+                             [])
+            answers = check(server)
+            digest = server.status(digest=True).map_digest
+            server.kill()
+        with self.reopen() as server:
+            self.assertEqual(check(server), answers)
+            self.assertEqual(server.terminate(), 0)
+        with self.reopen() as server:
+            self.assertEqual(check(server), answers)
+            self.assertEqual(server.status(digest=True).map_digest, digest)
 
 
 class PastByPlace(LiveTest):

@@ -245,6 +245,67 @@ TEST(ContactCodec, LinkedNamesComeBackAndTakeAVersionOfTheirOwn) {
   });
 }
 
+TEST(ContactCodec, OlderEstimatesComeBackAndTakeAVersionOfTheirOwn) {
+  for (const std::size_t count : {std::size_t{1}, map::kOlderEstimates}) {
+    for (const bool linked : {false, true}) {
+      map::StoredContact contact;
+      contact.key = {.source = {"c4i"}, .contact = {"T9"}};
+      contact.estimates.resize(1);
+      static_cast<map::ContactPoint&>(contact.estimates[0]) =
+          SampleContactPoint(3);
+      contact.estimates[0].key = contact.key;
+      for (std::size_t i = 0; i < count; ++i) {
+        contact.older.push_back(SampleContactPoint(static_cast<int>(i)));
+      }
+      if (linked) {
+        contact.links = map::ContactLinks{
+            .since = TimeFromUnixMicros(7),
+            .names = {{.source = {"ais"}, .contact = {"235000001"}}}};
+      }
+      const Bytes stored = EncodeContact(contact);
+      EXPECT_EQ(stored[1], 4);
+      FATHOM_ASSERT_OK_AND_ASSIGN(const map::StoredContact back,
+                                  DecodeContact(stored, "c"));
+      EXPECT_EQ(back.older, contact.older);
+      EXPECT_EQ(back.estimates, contact.estimates);
+      EXPECT_EQ(back.links, contact.links);
+      ExpectNoCrash(stored, BlobKind::kContact, [](ByteSpan bytes) {
+        DecodeContact(bytes, "c").IgnoreError();
+      });
+    }
+  }
+}
+
+// A flag that no encoder writes, and a version 4 without what it is for.
+TEST(ContactCodec, RefusesWhatIsNoVersionFour) {
+  map::StoredContact contact;
+  contact.key = {.source = {"radar"}, .contact = {"c"}};
+  contact.estimates.resize(1);
+  static_cast<map::ContactPoint&>(contact.estimates[0]) = SampleContactPoint(3);
+  contact.older.push_back(SampleContactPoint(2));
+  const Bytes stored = EncodeContact(contact);
+  const auto sealed = [](std::vector<std::uint8_t> payload) {
+    ByteWriter writer = StartBlob();
+    for (const std::uint8_t byte : payload) writer.PutU8(byte);
+    return SealBlob(BlobKind::kContact, 4, std::move(writer));
+  };
+  std::vector<std::uint8_t> payload(stored.begin() + kBlobHeaderBytes,
+                                    stored.end());
+  EXPECT_THAT(DecodeContact(sealed(payload), "c"), IsOk());
+  // The last byte says whether there are other names.
+  ASSERT_EQ(payload.back(), 0);
+  payload.back() = 2;
+  EXPECT_THAT(DecodeContact(sealed(payload), "c"),
+              StatusIs(absl::StatusCode::kDataLoss));
+  contact.older.clear();
+  const Bytes without = EncodeContact(contact);
+  payload.assign(without.begin() + kBlobHeaderBytes, without.end());
+  payload.push_back(0);
+  payload.push_back(0);
+  EXPECT_THAT(DecodeContact(sealed(payload), "c"),
+              StatusIs(absl::StatusCode::kDataLoss));
+}
+
 TEST(ContactCodec, VersionOneHasNoRecentReports) {
   map::StoredContact contact;
   contact.key = {.source = {"radar"}, .contact = {"c"}};

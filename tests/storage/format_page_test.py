@@ -3,6 +3,7 @@ checksum, every blob to its last byte. If this and the page do not agree, one
 of them is wrong."""
 
 import ctypes
+import datetime
 import pathlib
 import sqlite3
 import struct
@@ -147,7 +148,7 @@ class FormatPage(unittest.TestCase):
         self.assertEqual(content[:16], b"SQLite format 3\0")
         self.assertEqual(content[20], 4)
         self.assertEqual(struct.unpack(">I", content[68:72])[0], 0x4674686D)
-        self.assertEqual(struct.unpack(">I", content[60:64])[0], 8)
+        self.assertEqual(struct.unpack(">I", content[60:64])[0], 9)
         for number in range(1, len(content) // PAGE + 1):
             page = content[(number - 1) * PAGE:number * PAGE]
             if any(page):
@@ -164,7 +165,7 @@ class FormatPage(unittest.TestCase):
 
     def test_tiles(self):
         leaves = 0
-        for key, blob in self.open("mission-v8.fathom").execute(
+        for key, blob in self.open("mission-v9.fathom").execute(
                 "SELECT tile_key, content FROM tile"):
             tile, _ = open_blob(blob, "T", (2,))
             self.assertEqual(tile.get("Q"), key)
@@ -187,7 +188,7 @@ class FormatPage(unittest.TestCase):
         self.assertGreater(leaves, 9)
 
     def test_activities_and_their_blocks(self):
-        database = self.open("mission-v8-closed.fathom")
+        database = self.open("mission-v9-closed.fathom")
         activities = {}
         for number, name, blob in database.execute(
                 "SELECT activity_number, activity_id, content FROM activity"):
@@ -225,19 +226,30 @@ class FormatPage(unittest.TestCase):
         self.assertEqual(touched, 9)
 
     def test_contacts_and_their_history(self):
-        database = self.open("mission-v8-closed.fathom")
+        database = self.open("mission-v9-closed.fathom")
         names = {}
         for number, source, contact, blob in database.execute(
                 "SELECT contact_number, source_id, contact_id, content FROM "
                 "contact"):
-            held, version = open_blob(blob, "C", (2, 3))
+            held, version = open_blob(blob, "C", (2, 3, 4))
             self.assertEqual((held.string(), held.string()), (source, contact))
             points = [Reader(row).point()
                       for row in held.rows(held.varint(), 242)]
             for _ in range(held.varint()):
                 self.assertLessEqual(held.get("B"), 3)
                 held.report()
-            if version == 3:
+            linked = version == 3
+            # tests/golden/make: one contact has 300 estimates, 256 of them
+            # newest and the rest too far apart to pass over any.
+            self.assertEqual(version == 4, contact == "trawler")
+            if version == 4:
+                older = [Reader(row).point()
+                         for row in held.rows(held.varint(), 242)]
+                self.assertEqual([p["time_us"] for p in older],
+                                 [START_US + 30_000_000 * i
+                                  for i in range(1, 45)])
+                linked = held.get("B") == 1
+            if linked:
                 held.get("q")
                 held.names()
             self.assert_end(held)
@@ -262,10 +274,10 @@ class FormatPage(unittest.TestCase):
                              (first, last, revision, count))
             counted[names[number]] = counted.get(names[number], 0) + count
         # Ten reports each, and the drop of one.
-        self.assertEqual(counted, {"ship": 10, "boat": 11})
+        self.assertEqual(counted, {"ship": 10, "boat": 11, "trawler": 300})
         self.assertEqual(
             database.execute("SELECT estimate_count, forgotten_count FROM "
-                             "contact_history_total").fetchall(), [(21, 0)])
+                             "contact_history_total").fetchall(), [(321, 0)])
 
     def geometry(self, blob, kind):
         """Longitudes and latitudes, all together."""
@@ -276,7 +288,7 @@ class FormatPage(unittest.TestCase):
         return struct.unpack(f"<{2 * count}d", blob[at:])
 
     def test_features(self):
-        database = self.open("mission-v8-closed.fathom")
+        database = self.open("mission-v9-closed.fathom")
         blocks = database.execute(
             "SELECT block_id, contact_number, source_id, contact_id, "
             "first_time_us, last_time_us, estimate_count, contact_history."
@@ -285,8 +297,9 @@ class FormatPage(unittest.TestCase):
 
         def text(time_us):
             self.assertEqual(time_us % 1_000_000, 0)
-            return f"2026-01-01T00:00:{(time_us - START_US) // 1_000_000:02d}" \
-                ".000Z"
+            moment = datetime.datetime.fromtimestamp(time_us // 1_000_000,
+                                                     datetime.timezone.utc)
+            return moment.strftime("%Y-%m-%dT%H:%M:%S.000Z")
         self.assertEqual(
             database.execute(
                 "SELECT fid, contact_number, source_id, contact_id, "
@@ -297,7 +310,7 @@ class FormatPage(unittest.TestCase):
                  database.execute("SELECT geom FROM tracks ORDER BY fid")]
         self.assertEqual([len(line) / 2 for line in lines],
                          [b[6] for b in blocks])
-        # tests/golden/make: every report 5 m further north than the one
+        # tests/golden/make: every estimate 10 m further north than the one
         # before, from 41.5 N, 71.4 W; a degree of latitude is 111.06 km there.
         for line in lines:
             self.assertAlmostEqual(line[0], -71.4, places=6)
@@ -350,7 +363,7 @@ class FormatPage(unittest.TestCase):
 
     def test_journal(self):
         found = []
-        for count, blob in self.open("mission-v8.fathom").execute(
+        for count, blob in self.open("mission-v9.fathom").execute(
                 "SELECT record_count, content FROM journal ORDER BY "
                 "segment_id"):
             segment, _ = open_blob(blob, "J", (1, 2))

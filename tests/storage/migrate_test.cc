@@ -35,24 +35,29 @@ std::string ReadAll(const std::string& path) {
   return std::string(std::istreambuf_iterator<char>(file), {});
 }
 
+// Reports about a third contact, in golden missions from version 9 on.
+constexpr std::uint64_t kThirdReports = 300;
+
 // What tests/golden/make puts into every golden mission. Its digest then is not
-// asked for: replayed reports are fused as this program fuses them.
-void ExpectGolden(MissionFile& file) {
+// asked for: replayed reports are fused as this program fuses them. `third`: 0
+// or kThirdReports.
+void ExpectGolden(MissionFile& file, std::uint64_t third = 0) {
   FATHOM_ASSERT_OK_AND_ASSIGN(
       const RestoredMap restored,
       RestoreMap(*file.Load(), *OptionsOf(file.metadata())));
   EXPECT_EQ(restored.refused_records, 0u);
   const auto view = restored.map->View();
   // A chart, 2 starts, 60 pings, 1 completion, 20 reports, 1 drop.
-  EXPECT_EQ(view->revision(), 1u + 2 + 60 + 1 + 20 + 1);
+  EXPECT_EQ(view->revision(), 1u + 2 + 60 + 1 + 20 + 1 + third);
   EXPECT_EQ(view->activities().size(), 2u);
-  EXPECT_EQ(view->contacts().size(), 2u);
-  EXPECT_EQ(view->contacts().live_count(), 1u);
+  const std::size_t others = third > 0 ? 1 : 0;
+  EXPECT_EQ(view->contacts().size(), 2u + others);
+  EXPECT_EQ(view->contacts().live_count(), 1u + others);
   // The nine cells of the first activity, and the chart about them.
   EXPECT_GT(view->global().known_leaf_count(), 9u);
   FATHOM_ASSERT_OK_AND_ASSIGN(const Proof proof, file.Verify());
   EXPECT_THAT(proof.problems, IsEmpty());
-  EXPECT_EQ(proof.history_rows, 21u);
+  EXPECT_EQ(proof.history_rows, 21u + third);
 }
 
 // Made with the last program of version 5.
@@ -171,16 +176,53 @@ TEST(Migrate, DamagedBlockOfVersion7IsToldAndTheRestServed) {
   EXPECT_THAT(proof.problems, IsEmpty());
 }
 
-// One copied while it was served, with a journal; one closed, with none.
-TEST(Migrate, MissionOfVersion8OpensAsItIs) {
+// No contact has older estimates.
+TEST(Migrate, MissionOfVersion8IsBackedUpAndBroughtToThisOne) {
   for (const char* name : {"mission-v8.fathom", "mission-v8-closed.fathom"}) {
     const TempDir dir;
     const std::string path = dir.File("m");
     std::filesystem::copy_file(
         std::string(FATHOM_SOURCE_DIR "/tests/golden/") + name, path);
+    FATHOM_ASSERT_OK_AND_ASSIGN(const Proof as_it_was, ProveFile(path));
+    EXPECT_THAT(as_it_was.problems, IsEmpty());
+    EXPECT_EQ(ReadAll(path)[63], 8);
+    for (int time = 0; time < 2; ++time) {
+      FATHOM_ASSERT_OK_AND_ASSIGN(const auto file, MissionFile::Open(path));
+      ExpectGolden(*file);
+      ASSERT_THAT(file->Close(), IsOk());
+    }
+    EXPECT_EQ(ReadAll(path)[63], kSchemaVersion);
+    EXPECT_EQ(ReadAll(path + ".v8.bak")[63], 8);
+  }
+}
+
+// One copied while it was served, with a journal; one closed, with none. The
+// third contact's past goes back to its first report, 256 of 300 before its
+// newest estimates.
+TEST(Migrate, MissionOfVersion9OpensAsItIs) {
+  for (const char* name : {"mission-v9.fathom", "mission-v9-closed.fathom"}) {
+    const TempDir dir;
+    const std::string path = dir.File("m");
+    std::filesystem::copy_file(
+        std::string(FATHOM_SOURCE_DIR "/tests/golden/") + name, path);
     FATHOM_ASSERT_OK_AND_ASSIGN(const auto file, MissionFile::Open(path));
-    ExpectGolden(*file);
-    EXPECT_FALSE(std::filesystem::exists(path + ".v8.bak"));
+    ExpectGolden(*file, kThirdReports);
+    EXPECT_FALSE(std::filesystem::exists(path + ".v9.bak"));
+    FATHOM_ASSERT_OK_AND_ASSIGN(
+        const RestoredMap restored,
+        RestoreMap(*file->Load(), *OptionsOf(file->metadata())));
+    const auto view = restored.map->View();
+    const map::ContactKey third = {.source = {"ais"}, .contact = {"trawler"}};
+    // tests/golden/make: every 30 s from 2026-01-01T00:00:30Z.
+    const Time start = TimeFromUnixMicros(1'767'225'600'000'000);
+    const map::Contact* contact = view->contacts().Find(third);
+    ASSERT_NE(contact, nullptr);
+    EXPECT_EQ(contact->older().size(), kThirdReports - 256);
+    EXPECT_FALSE(view->contacts().At(third, start).has_value());
+    const auto first =
+        view->contacts().At(third, start + std::chrono::seconds(45));
+    ASSERT_TRUE(first.has_value());
+    EXPECT_LT(first->P(0, 0), 100);
   }
 }
 

@@ -351,7 +351,7 @@ std::vector<SphereError> SphereEncounterErrors(const std::string& folder) {
     begin.x.tail<2>() = Along(n[7] * kKnotMPerS, azimuth_deg);
     begin.P = Eigen::Matrix4d::Identity();
     map::Contact target({.source = {"reference"}, .contact = {"jord"}});
-    target.history().Append(begin);
+    target.Append(begin, map::DefaultContactClasses());
     const map::TimedPlace path[] = {
         {own_at(tcpa_s - 600), begin_time},
         {own_at(tcpa_s), begin_time + kTenMinutes},

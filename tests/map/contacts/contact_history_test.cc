@@ -62,11 +62,16 @@ TEST(TrackHistory, CopiesDoNotSeeWhatComesLater) {
   EXPECT_EQ(history.newest().time, AtS(1));
 }
 
+// As of a mission of a format that had no older estimates.
 TEST(Contact, PastBeyondWhatIsKeptIsPredictedBackToTheTracksStart) {
-  ContactMap map(ContactMapOptions{});
+  ContactMap source(ContactMapOptions{});
   for (int i = 0; i < 300; ++i) {
-    map.Apply(Fix("a", 10 * i, Direct(kBay, 0, 50.0 * i), 5, 0));
+    source.Apply(Fix("a", 10 * i, Direct(kBay, 0, 50.0 * i), 5, 0));
   }
+  StoredContact stored = source.View().Find(Key("a"))->ToStored();
+  stored.older.clear();
+  ContactMap map(source.options());
+  FATHOM_ASSERT_OK(map.Restore(stored));
   const ContactsView view = map.View();
   // 44 to 299 are kept; 44 was at 440 s.
   EXPECT_NEAR(view.At(Key("a"), AtS(440))->x(0), 0, 1e-6);

@@ -350,5 +350,29 @@ TEST(PolarNis, IsTheSumOfSquaresInRangeAndBearing) {
               8, 1e-9);
 }
 
+TEST(Fuse, WeighsEachByTheOthersVariance) {
+  // 1 and 3: a quarter of the way, variance 1 * 3 / (1 + 3); velocities of 4
+  // and 4 in the middle.
+  TrackState a;
+  a.x << 10, 0, 2, 0;
+  a.P.diagonal() << 1, 1, 4, 4;
+  TrackState b;
+  b.x << 14, 0, 4, 0;
+  b.P.diagonal() << 3, 3, 4, 4;
+  const TrackState fused = Fuse(a, b);
+  EXPECT_LT((fused.x - Eigen::Vector4d(11, 0, 3, 0)).norm(), 1e-12);
+  EXPECT_LT((fused.P.diagonal() - Eigen::Vector4d(0.75, 0.75, 2, 2)).norm(),
+            1e-12);
+  // The order does not matter, nor what lies between the axes.
+  a.P(0, 1) = a.P(1, 0) = 0.5;
+  b.P(0, 2) = b.P(2, 0) = -1;
+  const TrackState one = Fuse(a, b);
+  const TrackState other = Fuse(b, a);
+  EXPECT_LT((one.x - other.x).norm(), 1e-12);
+  EXPECT_LT((one.P - other.P).norm(), 1e-12);
+  const Eigen::Matrix4d P = (a.P.inverse() + b.P.inverse()).inverse();
+  EXPECT_LT((one.P - P).norm(), 1e-12);
+}
+
 }  // namespace
 }  // namespace fathom::map
