@@ -158,8 +158,8 @@ inline constexpr size_t kMaxMessagesPerView = 256;
 // alone never waits.
 inline constexpr std::chrono::microseconds kViewInterval{1000};
 // How often an idle writer looks whether readers have unpacked tiles of the
-// global map beyond the budget (only if any is packed): two readers unpack some
-// 20 MB meanwhile at worst, and a look costs 1 us.
+// global map beyond the budget (only if any is packed): two busy processors
+// unpack 20 to 40 MB meanwhile at worst, and a look costs 1 us.
 inline constexpr std::chrono::milliseconds kTileBudgetInterval{50};
 // The same for group commits, the design's shortest (2-20 ms): each costs a
 // transaction and an fsync, however little it holds.

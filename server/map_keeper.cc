@@ -289,7 +289,8 @@ void MapKeeper::WakeMapper() {
 
 bool MapKeeper::TakeCommands(std::vector<Command>& commands) {
   // What is packed may be unpacked by readers meanwhile.
-  const bool any_packed = map_->tile_use().packed_tiles > 0;
+  const bool any_packed =
+      map_->tile_use().packed_tiles > 0 || map_->over_budget();
   MutexLock lock(mutex_);
   while (queue_.empty() && !stopping_) {
     mapper_waits_ = true;

@@ -40,10 +40,13 @@ bool IsEstimate(const ContactPoint& point) {
          ValidateGeodetic(point.Position()).ok();
 }
 
-// Whether the covariance is one, but for rounding.
+// Whether the covariance is one, but for rounding; of a sensor that says it is
+// exact it may be 0.
 bool IsCovariance(const Eigen::Matrix4d& P) {
+  constexpr double kLeastVariance = 1e-12;
   Eigen::Matrix4d raised = P;
   raised.diagonal() *= 1 + 1e-6;
+  raised.diagonal().array() += kLeastVariance;
   return P == P.transpose() && raised.llt().info() == Eigen::Success;
 }
 

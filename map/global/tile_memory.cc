@@ -1,5 +1,6 @@
 #include "map/global/tile_memory.h"
 
+#include <algorithm>
 #include <cstdlib>
 #include <utility>
 
@@ -9,6 +10,9 @@ namespace {
 // What an allocator adds to a block of memory, near enough.
 constexpr std::uint64_t kAllocationBytes = 16;
 constexpr std::uint64_t kControlBytes = 16;
+
+// Of what was evicted so much may wait for guards, or the budget.
+constexpr std::uint64_t kLeastRetiredBytes = 1 << 20;
 
 std::uint64_t BytesOf(const PackedTile& packed) {
   return packed.capacity() + sizeof(PackedTile) + 2 * kAllocationBytes;
@@ -47,6 +51,11 @@ void TileMemory::Unlink(const TileSlot& slot) {
 
 std::shared_ptr<const TileSlot> TileMemory::NextVictim(std::uint64_t& steps) {
   MutexLock lock(mutex_);
+  // Evicting frees nothing while somebody holds an old guard; what is read
+  // again meanwhile would be there many times.
+  if (retired_bytes_ > std::max(options_.budget_bytes, kLeastRetiredBytes)) {
+    return nullptr;
+  }
   for (; steps > 0 && hand_ != nullptr; --steps) {
     const TileSlot* const slot = hand_;
     hand_ = slot->next_;

@@ -6,6 +6,7 @@
 #include <optional>
 #include <random>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "map/contacts/contact_map.h"
@@ -140,6 +141,27 @@ TEST(ContactMap, RestoredContactsGoOnBitForBit) {
     });
   }
   EXPECT_GT(compared, 1000);
+}
+
+// A review's find: the first estimate of such a track has a covariance of 0,
+// and is kept for ever; the mission could not be opened again.
+TEST(ContactMap, AnExactSensorsTrackIsRestored) {
+  ContactMap map(ContactMapOptions{});
+  for (int i = 0; i < 300; ++i) {
+    ContactReport report = Heard("a", 2.0 * i, kBay, 1000 + i, 90);
+    auto& heard = std::get<RangeBearing>(report.observation);
+    if (i == 0) heard.range_std_m = heard.bearing_std_deg = 1e-200;
+    EXPECT_TRUE(map.Apply(report).applied) << i;
+  }
+  const ContactsView view = map.View();
+  const Contact& contact = *view.Find(Key("a"));
+  ASSERT_GT(contact.older().size(), 0u);
+  ASSERT_EQ(contact.older()[0].P(0, 0), 0);
+  ContactMap second(map.options());
+  FATHOM_EXPECT_OK(second.Restore(contact.ToStored()));
+  StoredContact bad = contact.ToStored();
+  bad.older[0].P(0, 0) = -1;
+  EXPECT_FALSE(ContactMap(map.options()).Restore(bad).ok());
 }
 
 TEST(ContactMap, RestoreRefusesWhatIsNotAContact) {

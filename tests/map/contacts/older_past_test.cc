@@ -123,8 +123,8 @@ struct Age {
 };
 constexpr Age kAges[] = {{60, 600, 1.05, 1.2},
                          {600, 1800, 1.5, 1.1},
-                         {3000, 4200, 4, 1.4},
-                         {4200, 1e6, 15, 8}};
+                         {3000, 4200, 3, 1.4},
+                         {4200, 1e6, 5, 8}};
 
 class OlderPast : public ::testing::TestWithParam<Scene> {};
 
