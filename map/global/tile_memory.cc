@@ -11,8 +11,9 @@ namespace {
 constexpr std::uint64_t kAllocationBytes = 16;
 constexpr std::uint64_t kControlBytes = 16;
 
-// Of what was evicted so much may wait for guards, or the budget.
-constexpr std::uint64_t kLeastRetiredBytes = 1 << 20;
+// While more than this of what was evicted waits for guards, and more than the
+// budget, no more is evicted.
+constexpr std::uint64_t kLeastRetiredBytes = 16 << 20;
 
 std::uint64_t BytesOf(const PackedTile& packed) {
   return packed.capacity() + sizeof(PackedTile) + 2 * kAllocationBytes;
@@ -51,11 +52,6 @@ void TileMemory::Unlink(const TileSlot& slot) {
 
 std::shared_ptr<const TileSlot> TileMemory::NextVictim(std::uint64_t& steps) {
   MutexLock lock(mutex_);
-  // Evicting frees nothing while somebody holds an old guard; what is read
-  // again meanwhile would be there many times.
-  if (retired_bytes_ > std::max(options_.budget_bytes, kLeastRetiredBytes)) {
-    return nullptr;
-  }
   for (; steps > 0 && hand_ != nullptr; --steps) {
     const TileSlot* const slot = hand_;
     hand_ = slot->next_;
@@ -83,6 +79,11 @@ bool TileMemory::Evict() {
   std::uint64_t steps = 0;
   {
     MutexLock lock(mutex_);
+    // Evicting frees nothing while somebody holds an old guard; what is read
+    // again meanwhile would be there many times.
+    if (retired_bytes_ > std::max(options_.budget_bytes, kLeastRetiredBytes)) {
+      return false;
+    }
     steps = 2 * clock_tiles_;
   }
   bool any = false;

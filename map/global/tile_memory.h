@@ -88,10 +88,10 @@ class TileMemory {
   TileMemory(const TileMemory&) = delete;
   TileMemory& operator=(const TileMemory&) = delete;
 
-  // Packs until the budget is kept, two rounds of the clock are made, or more
-  // than the budget (1 MiB) waits for guards. Whether anything was packed; the
-  // writer then begins a new guard, so that readers to come do not keep what
-  // was evicted. 0.3 ms for a tile that was never packed, else 0.2 us.
+  // Packs until the budget is kept or two rounds of the clock are made; nothing
+  // while more than the budget (16 MiB) waits for guards. Whether anything was
+  // packed; the writer then begins a new guard, so that readers to come do not
+  // keep what was evicted. 0.3 ms for a tile never packed before, else 0.2 us.
   bool Evict() FATHOM_EXCLUDES(mutex_);
 
   bool over_budget() const {
@@ -126,7 +126,7 @@ class TileMemory {
   void Link(const TileSlot& slot) FATHOM_REQUIRES(mutex_);
   void Unlink(const TileSlot& slot) FATHOM_REQUIRES(mutex_);
   // The next slot on the clock that was not read since it was last looked at;
-  // null: none within `steps`, which counts down, or too much waits for guards.
+  // null: none within `steps`, which counts down.
   std::shared_ptr<const TileSlot> NextVictim(std::uint64_t& steps)
       FATHOM_EXCLUDES(mutex_);
   void Retire(const TileSlot& slot) FATHOM_EXCLUDES(mutex_);

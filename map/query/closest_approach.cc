@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -26,6 +27,11 @@ constexpr std::array<double, 5> kWeights = {
 constexpr int kPieces = 8;
 // Beyond so many standard deviations nothing is left that counts.
 constexpr double kTail = 8;
+
+// Between estimates further apart than this a smoothed track may bend: it is
+// cut in so many pieces there.
+constexpr std::chrono::seconds kLongestStraight{5};
+constexpr int kCuts = 4;
 
 // Both at the ends of a piece of time, in the contact's plane.
 struct Ends {
@@ -56,6 +62,30 @@ GeodeticPoint Between(const TimedPlace& a, const TimedPlace& b, Time time) {
   const RangeAzimuth way = Inverse(a.position, b.position);
   return Direct(a.position, way.azimuth_deg,
                 way.distance_m * ToSeconds(time - a.time) / span_s);
+}
+
+// The times between which the contact's known past is taken as straight, in
+// order: its estimates, and where these are far apart times between them.
+std::vector<Time> Turns(const Contact& contact) {
+  std::vector<Time> turns;
+  const auto turn_at = [&turns](Time time) {
+    if (!turns.empty() && time - turns.back() >= kLongestStraight) {
+      const Time before = turns.back();
+      for (int i = 1; i < kCuts; ++i) {
+        turns.push_back(before + i * (time - before) / kCuts);
+      }
+      // A fix overwrites: the track may leap there.
+      turns.push_back(time - Duration(1));
+    }
+    turns.push_back(time);
+  };
+  for (std::size_t i = 0; i < contact.older().size(); ++i) {
+    turn_at(contact.older()[i].time);
+  }
+  for (std::size_t i = 0; i < contact.history().size(); ++i) {
+    turn_at(contact.history()[i].time);
+  }
+  return turns;
 }
 
 }  // namespace
@@ -128,21 +158,17 @@ std::optional<Approach> ClosestApproach(const Contact& contact,
                                         const ContactClassTable& classes,
                                         std::span<const TimedPlace> path,
                                         const ApproachQuestion& question) {
+  const std::vector<Time> turns = Turns(contact);
   // The times at which one of the two may turn.
   std::vector<TimedPlace> places;
-  const auto turn_on = [&](std::size_t leg, const auto& estimates) {
-    for (std::size_t i = 0; i < estimates.size(); ++i) {
-      const Time time = estimates[i].time;
-      if (time > path[leg].time && time < path[leg + 1].time &&
-          time > places.back().time) {
-        places.push_back({Between(path[leg], path[leg + 1], time), time});
-      }
-    }
-  };
   for (std::size_t leg = 0; leg + 1 < path.size(); ++leg) {
     places.push_back(path[leg]);
-    turn_on(leg, contact.older());
-    turn_on(leg, contact.history());
+    for (auto time =
+             std::upper_bound(turns.begin(), turns.end(), path[leg].time);
+         time != turns.end() && *time < path[leg + 1].time; ++time) {
+      if (*time == places.back().time) continue;
+      places.push_back({Between(path[leg], path[leg + 1], *time), *time});
+    }
   }
   places.push_back(path.back());
 

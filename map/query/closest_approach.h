@@ -78,7 +78,8 @@ struct ApproachQuestion {
 // The CPA of a contact and a vehicle on straight legs at constant rate.
 // nullopt: the contact is nowhere during the path, or beyond kFarthestM of it.
 // REQUIRES: at least one place; times ascend. A leg of which the past is known
-// is cut at the contact's estimates.
+// is cut at the contact's estimates, and between such as are 5 s or more apart
+// in four, and just before the later one, where a fix may make it leap.
 std::optional<Approach> ClosestApproach(const Contact& contact,
                                         const ContactClassTable& classes,
                                         std::span<const TimedPlace> path,

@@ -175,19 +175,26 @@ class Hostile(LiveTest):
     def test_giant_messages(self):
         giant = bytes(100 << 20)
 
-        def send(channel, codes):
+        def send(channel, codes, reasons):
             try:
                 channel.unary_unary(QUERY)(giant, timeout=DEADLINE_S)
             except grpc.RpcError as error:
                 codes.append(error.code())
+                reasons.append(error.details())
         codes = []
+        reasons = []
         with contextlib.ExitStack() as stack:
             channels = [stack.enter_context(grpc.insecure_channel(
                 self.server.address,
                 options=[("grpc.use_local_subchannel_pool", 1),
                          ("grpc.max_send_message_length", -1)]))
                         for _ in range(4)]
-            threads = [threading.Thread(target=send, args=(channel, codes))
+            # Who comes while the others' giants fill the server's memory may be
+            # refused the connection.
+            for channel in channels:
+                grpc.channel_ready_future(channel).result(DEADLINE_S)
+            threads = [threading.Thread(target=send,
+                                        args=(channel, codes, reasons))
                        for channel in channels]
             for thread in threads:
                 thread.start()
@@ -195,7 +202,8 @@ class Hostile(LiveTest):
             for thread in threads:
                 thread.join(DEADLINE_S)
                 self.look()
-        self.assertEqual(codes, [grpc.StatusCode.RESOURCE_EXHAUSTED] * 4)
+        self.assertEqual(codes, [grpc.StatusCode.RESOURCE_EXHAUSTED] * 4,
+                         reasons)
 
     def test_slow_readers(self):
         """200 regions of 12 M cells each, of which nobody reads a byte more

@@ -42,34 +42,41 @@ State Predicted(State s, double t, double q) {
   return s;
 }
 
-// `here`, knowing `later` T seconds on. G = P F' (P of the prediction)^-1.
-State Smoothed(const State& here, double t, double q, const State& later) {
-  const State ahead = Predicted(here, t, q);
-  // P F' with F = [1 T; 0 1].
-  const double a = here.pp + t * here.pv;
-  const double b = here.pv;
-  const double c = here.pv + t * here.vv;
-  const double d = here.vv;
-  const double det = ahead.pp * ahead.vv - ahead.pv * ahead.pv;
-  const double g11 = (a * ahead.vv - b * ahead.pv) / det;
-  const double g12 = (b * ahead.pp - a * ahead.pv) / det;
-  const double g21 = (c * ahead.vv - d * ahead.pv) / det;
-  const double g22 = (d * ahead.pp - c * ahead.pv) / det;
-  State s = here;
-  const auto move = [&](Axis& axis, const Axis& from, const Axis& to) {
-    axis.p += g11 * (to.p - from.p) + g12 * (to.v - from.v);
-    axis.v += g21 * (to.p - from.p) + g22 * (to.v - from.v);
-  };
-  move(s.north, ahead.north, later.north);
-  move(s.east, ahead.east, later.east);
-  // P + G (P of later - P of the prediction) G'.
-  const double e = later.pp - ahead.pp;
-  const double f = later.pv - ahead.pv;
-  const double h = later.vv - ahead.vv;
-  s.pp += g11 * (e * g11 + f * g12) + g12 * (f * g11 + h * g12);
-  s.pv += g11 * (e * g21 + f * g22) + g12 * (f * g21 + h * g22);
-  s.vv += g21 * (e * g21 + f * g22) + g22 * (f * g21 + h * g22);
+// The same backwards: p - T v, disturbed on the way as much.
+State PredictedBack(State s, double t, double q) {
+  s.north.p -= t * s.north.v;
+  s.east.p -= t * s.east.v;
+  s.pp += -2 * t * s.pv + t * t * s.vv + q * t * t * t / 3;
+  s.pv += -t * s.vv - q * t * t / 2;
+  s.vv += q * t;
   return s;
+}
+
+// What two that know nothing of each other say together: informations add.
+State Together(const State& a, const State& b) {
+  struct Information {
+    double pp, pv, vv;
+  };
+  const auto inverse = [](double pp, double pv, double vv) {
+    const double det = pp * vv - pv * pv;
+    return Information{vv / det, -pv / det, pp / det};
+  };
+  const Information of_a = inverse(a.pp, a.pv, a.vv);
+  const Information of_b = inverse(b.pp, b.pv, b.vv);
+  const Information sum =
+      inverse(of_a.pp + of_b.pp, of_a.pv + of_b.pv, of_a.vv + of_b.vv);
+  const auto mean = [&](const Axis& x, const Axis& y) {
+    const double p =
+        of_a.pp * x.p + of_a.pv * x.v + of_b.pp * y.p + of_b.pv * y.v;
+    const double v =
+        of_a.pv * x.p + of_a.vv * x.v + of_b.pv * y.p + of_b.vv * y.v;
+    return Axis{.p = sum.pp * p + sum.pv * v, .v = sum.pv * p + sum.vv * v};
+  };
+  return {.north = mean(a.north, b.north),
+          .east = mean(a.east, b.east),
+          .pp = sum.pp,
+          .pv = sum.pv,
+          .vv = sum.vv};
 }
 
 // The track at a time; absent before its first fix.
@@ -82,12 +89,8 @@ std::optional<State> At(const Track& track, double time_s) {
   const State ahead =
       Predicted(StateOf(fixes[last]), time_s - fixes[last].time_s, q);
   if (last + 1 == fixes.size()) return ahead;
-  State later = StateOf(fixes.back());
-  for (std::size_t i = fixes.size() - 1; i > last + 1; --i) {
-    later = Smoothed(StateOf(fixes[i - 1]),
-                     fixes[i].time_s - fixes[i - 1].time_s, q, later);
-  }
-  return Smoothed(ahead, fixes[last + 1].time_s - time_s, q, later);
+  return Together(ahead, PredictedBack(StateOf(fixes[last + 1]),
+                                       fixes[last + 1].time_s - time_s, q));
 }
 
 // P(|X| <= radius) of N((north, east), s^2 I): over north, put as radius

@@ -6,11 +6,12 @@
 //             4.18 with 4.20 (kalman) or 4.21 (nervegna); adaptive: from all
 //             soundings of a cell and of its neighbours at once, as
 //             map/local/adaptive.h states the model; aged by rate x age
-//   contacts  fixes; between two of them the fixed-interval smoother (Rauch,
-//             Tung, Striebel 1965), behind the last the prediction under
-//             white acceleration (eqs. 5.19-5.23 with Q = q [T^3/3 T^2/2;
-//             T^2/2 T]). A fix is equally sure of north and east and both
-//             move by the same law: one 2 x 2 filter per axis is exact.
+//   contacts  fixes, each the truth when it came: between two of them what the
+//             one before foretells and the one behind tells back, together;
+//             behind the last the prediction under white acceleration (eqs.
+//             5.19-5.23 with Q = q [T^3/3 T^2/2; T^2/2 T]). A fix is equally
+//             sure of north and east and both move by the same law: one 2 x 2
+//             filter per axis is exact.
 //   P         domain.md section 1; the disc by quadrature
 //
 // Metres are north and east of the scene's corner on a tangent plane.
