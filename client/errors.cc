@@ -83,6 +83,7 @@ bool MayMend(absl::StatusCode code) {
   switch (code) {
     case absl::StatusCode::kUnavailable:
     case absl::StatusCode::kResourceExhausted:  // Storage full: waits for room.
+    case absl::StatusCode::kDataLoss:  // Damaged: waits for the repaired one.
     case absl::StatusCode::kAborted:
     case absl::StatusCode::kCancelled:  // By Reconnect, or by a dying server.
     case absl::StatusCode::kInternal:   // RST_STREAM of a dying server.

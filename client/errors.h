@@ -37,7 +37,7 @@ std::vector<FieldError> FieldErrors(const absl::Status& status);
 std::optional<std::chrono::milliseconds> RetryDelay(const absl::Status& status);
 
 // Whether a stream that ended so is worth a new connection: the server is
-// away, or full, or is going down.
+// away, or full, or is going down, or waits for its mission to be repaired.
 bool MayMend(absl::StatusCode code);
 
 }  // namespace fathom::client

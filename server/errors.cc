@@ -125,6 +125,15 @@ absl::Status StorageFull(std::string_view fault) {
   return status;
 }
 
+absl::Status StorageDamaged(std::string_view fault) {
+  absl::Status status = absl::DataLossError(absl::StrFormat(
+      "the mission file is damaged, nothing new is taken until a repaired one "
+      "is served (queries go on): %s",
+      fault));
+  AttachReason(status, "STORAGE_DAMAGED");
+  return status;
+}
+
 absl::Status ShuttingDown() {
   absl::Status status = absl::UnavailableError(
       "the server is shutting down; resend what is not durable to its "

@@ -54,6 +54,10 @@ absl::Status QueueFull();
 // queries go on. RetryInfo.
 absl::Status StorageFull(std::string_view fault);
 
+// DATA_LOSS: the mission file is damaged where it is to be written (`fault`
+// says where and what to do); queries go on.
+absl::Status StorageDamaged(std::string_view fault);
+
 // UNAVAILABLE: the server is shutting down. RetryInfo.
 absl::Status ShuttingDown();
 

@@ -52,7 +52,7 @@ class ReportBatch final : public IngestListener {
   void OnRoom() override {}
 
   void OnFault() override {
-    Answer(StorageFull(context_.keeper.storage_state().fault));
+    Answer(StorageFault(context_.keeper.storage_state()));
   }
 
  private:

@@ -45,7 +45,10 @@ void IngestStream<Kind>::OnReadDone(bool ok) {
       ended = !end.ok();
     }
   }
-  if (ended) End(end, /*abandon=*/absl::IsResourceExhausted(end));
+  if (ended) {
+    End(end,
+        /*abandon=*/absl::IsResourceExhausted(end) || absl::IsDataLoss(end));
+  }
   {
     MutexLock lock(mutex_);
     reading_ = false;
@@ -198,7 +201,7 @@ void IngestStream<Kind>::OnFault() {
     MutexLock lock(mutex_);
     if (finished_) return;
   }
-  End(StorageFull(context_.keeper.storage_state().fault), /*abandon=*/true);
+  End(StorageFault(context_.keeper.storage_state()), /*abandon=*/true);
   PumpLater();
 }
 

@@ -6,8 +6,9 @@
 //   1  could not start; nothing was changed
 //   2  flags that make no sense
 //   3  the mission file could not be written while serving (an I/O error, or
-//      the disk was still full at the end): what was acknowledged is in it,
-//      what was not must be sent again. A supervisor should start it again.
+//      the disk was still full at the end, or a damaged page in the way): what
+//      was acknowledged is in it, what was not must be sent again. A supervisor
+//      should start it again.
 
 #include <pthread.h>
 #include <signal.h>
@@ -330,10 +331,13 @@ absl::Status Serve(Flags& flags, bool& file_failed) {
   const absl::Status closed = file->Close();
   if (failed || !stopped.ok()) {
     file_failed = true;
-    return absl::Status(stopped.code(),
-                        absl::StrFormat("not everything could be written "
-                                        "(nothing acknowledged is lost): %s",
-                                        std::string(stopped.message())));
+    return absl::Status(
+        stopped.code(),
+        absl::StrFormat("not everything could be written (%s): %s",
+                        absl::IsDataLoss(stopped)
+                            ? "the file is damaged, what it holds is untouched"
+                            : "nothing acknowledged is lost",
+                        std::string(stopped.message())));
   }
   FATHOM_RETURN_IF_ERROR(closed);
   Log(LogLevel::kInfo, "stopped path=%s revision=%d", flags.mission_path,

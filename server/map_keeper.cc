@@ -116,7 +116,8 @@ StorageState MapKeeper::storage_state() const {
 
 absl::Status MapKeeper::Admit() const {
   if (!storage_.fault.empty()) {
-    return absl::ResourceExhaustedError(storage_.fault);
+    return storage_.damaged ? absl::DataLossError(storage_.fault)
+                            : absl::ResourceExhaustedError(storage_.fault);
   }
   if (stopping_) return absl::UnavailableError("the server is shutting down");
   return absl::OkStatus();

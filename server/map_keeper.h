@@ -13,7 +13,8 @@
 //  4. Work under way (submitted, not yet durable) is bounded in messages and
 //     bytes; a stream holds at most one message beyond the bound.
 //  5. After a storage fault nothing new is taken until the waiting batch is
-//     committed; queries go on; nothing that was told durable is lost.
+//     committed (where the file is damaged: never); queries go on; nothing
+//     that was told durable is lost.
 //
 // All changes of the file that are not in the journal (transfer, import) are
 // made durable by a checkpoint: the view at that moment, which the storage
@@ -65,7 +66,7 @@ struct KeeperOptions {
   std::chrono::milliseconds storage_retry_delay = kStorageRetryDelay;
   // Called once, on the storage thread, when the file must not be written any
   // more (I/O error, failed fsync): the program should end. Without it the
-  // keeper only stays in fault.
+  // keeper only stays in fault, as it does where the file is damaged.
   std::function<void(const absl::Status&)> on_fatal = nullptr;
 };
 
@@ -110,6 +111,8 @@ struct StorageState {
   uint64_t journal_records = 0;
   // Why nothing new is taken; empty: all is well.
   std::string fault;
+  // The fault is damage of the file: it does not pass.
+  bool damaged = false;
 };
 
 // See file comment.
@@ -157,7 +160,8 @@ class MapKeeper {
 
   // Takes one message of a stream; always, if the answer is OK, also beyond
   // the bound (by one a stream, invariant 4). Errors: RESOURCE_EXHAUSTED
-  // (storage fault; the message was not taken), UNAVAILABLE (stopping).
+  // (storage fault; the message was not taken), DATA_LOSS (the same: the
+  // mission file is damaged), UNAVAILABLE (stopping).
   absl::StatusOr<Room> Submit(IngestMessage message,
                               std::shared_ptr<IngestListener> listener);
 
@@ -168,8 +172,8 @@ class MapKeeper {
 
   // ---- Commands: `done` runs once, when the change is durable or was
   // refused, on a thread of the keeper's. Beside the map's own errors:
-  // RESOURCE_EXHAUSTED (storage fault), ABORTED (too many commands wait),
-  // UNAVAILABLE (stopping). ----
+  // RESOURCE_EXHAUSTED (storage fault), DATA_LOSS (the mission file is
+  // damaged), ABORTED (too many commands wait), UNAVAILABLE (stopping). ----
 
   void StartActivity(map::StartActivity event, Done<Nothing> done);
   void CompleteActivity(map::ActivityId id, bool discard,

@@ -5,6 +5,7 @@
 #include <type_traits>
 
 #include "absl/strings/str_format.h"
+#include "base/log.h"
 #include "base/status_macros.h"
 #include "server/map_keeper.h"
 
@@ -113,6 +114,9 @@ absl::Status MapKeeper::CommitBatch(const storage::Batch& batch,
     if (!absl::IsResourceExhausted(status)) {
       if (status.ok()) {
         MutexLock lock(mutex_);
+        if (!storage_.fault.empty()) {
+          Log(LogLevel::kInfo, "the mission file can be written again");
+        }
         storage_.fault.clear();
       } else {
         EnterFault(status, items);
@@ -133,11 +137,14 @@ void MapKeeper::EnterFault(const absl::Status& status,
   {
     MutexLock lock(mutex_);
     const bool first = storage_.fault.empty();
+    storage_.damaged = absl::IsDataLoss(status);
     storage_.fault = std::string(status.message());
     if (storage_.fault.empty()) storage_.fault = status.ToString();
     if (!first) return;
     listeners.swap(waiting_);
   }
+  Log(LogLevel::kError, "nothing new is taken, queries go on: %s",
+      std::string(status.message()));
   for (const StorageItem& item : items) {
     if (item.listener != nullptr) listeners.push_back(item.listener);
   }
@@ -203,7 +210,10 @@ void MapKeeper::GiveUp(const absl::Status& status,
     MutexLock lock(mutex_);
     first = end_.ok();
     if (first) end_ = status;
-    fatal = first && !absl::IsResourceExhausted(status);
+    // Where damage stood in the way nothing was written: there is nothing to
+    // save by ending, and the map still answers.
+    fatal = first && !absl::IsResourceExhausted(status) &&
+            !absl::IsDataLoss(status);
   }
   for (const StorageItem& item : items) {
     if (item.done) item.done(status);

@@ -19,8 +19,9 @@ class MissionStore {
   virtual ~MissionStore() = default;
 
   // Makes the batch durable as one transaction, or nothing of it. Errors:
-  // RESOURCE_EXHAUSTED (no space: may pass by itself, try again); any other
-  // error means that the file must not be written any more.
+  // RESOURCE_EXHAUSTED (no space: may pass by itself, try again); DATA_LOSS
+  // (damage stands in the way, nothing was written); any other error means
+  // that the file must not be written any more.
   virtual absl::Status Commit(const storage::Batch& batch) = 0;
 
   // Nothing has come for a while: time for housekeeping that never waits.

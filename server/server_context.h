@@ -71,6 +71,11 @@ struct ServerContext {
       std::chrono::steady_clock::now();
 };
 
+// The named error for the keeper's storage fault.
+inline absl::Status StorageFault(const StorageState& state) {
+  return state.damaged ? StorageDamaged(state.fault) : StorageFull(state.fault);
+}
+
 // The named error for a status that the keeper (not the map) gave.
 inline absl::Status KeeperError(const ServerContext& context,
                                 const absl::Status& status) {
@@ -79,9 +84,10 @@ inline absl::Status KeeperError(const ServerContext& context,
       return ShuttingDown();
     case absl::StatusCode::kAborted:
       return QueueFull();
+    case absl::StatusCode::kDataLoss:
     case absl::StatusCode::kResourceExhausted: {
-      const std::string fault = context.keeper.storage_state().fault;
-      return fault.empty() ? status : StorageFull(fault);
+      const StorageState state = context.keeper.storage_state();
+      return state.fault.empty() ? status : StorageFault(state);
     }
     default:
       return status;

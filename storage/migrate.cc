@@ -37,12 +37,6 @@ absl::Status ToVersion6(Connection& connection) {
   return connection.CheckpointTruncate();
 }
 
-absl::Status Damaged(const absl::Status& status) {
-  if (!absl::IsDataLoss(status)) return status;
-  return absl::DataLossError(absl::StrFormat(
-      "%s; `fathom mission repair OLD NEW` saves the rest", status.message()));
-}
-
 // From a history in rows to one in blocks (history_table.h), which come with
 // their features, in one transaction.
 absl::Status RowsToVersion8(Connection& connection) {
@@ -73,7 +67,8 @@ absl::Status RowsToVersion8(Connection& connection) {
       return absl::OkStatus();
     };
     FATHOM_RETURN_IF_ERROR(
-        ReadOldHistory(connection, "contact_history_6", take, Damaged));
+        ReadOldHistory(connection, "contact_history_6", take,
+                       [](const absl::Status& damage) { return damage; }));
     FATHOM_RETURN_IF_ERROR(write());
   }
   FATHOM_RETURN_IF_ERROR(connection.Execute("DROP TABLE contact_history_6"));
@@ -86,7 +81,7 @@ absl::Status BlocksToVersion8(Connection& connection) {
   FATHOM_ASSIGN_OR_RETURN(Transaction transaction,
                           Transaction::Begin(connection));
   FATHOM_RETURN_IF_ERROR(CreateFeatureTables(connection));
-  FATHOM_RETURN_IF_ERROR(Damaged(FillFeatureTables(connection)));
+  FATHOM_RETURN_IF_ERROR(FillFeatureTables(connection));
   FATHOM_RETURN_IF_ERROR(connection.Execute("PRAGMA user_version = 8"));
   return transaction.Commit();
 }

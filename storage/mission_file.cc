@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <map>
 #include <optional>
 #include <system_error>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "absl/strings/str_format.h"
@@ -24,6 +22,7 @@
 #include "storage/migrate.h"
 #include "storage/schema.h"
 #include "storage/sqlite.h"
+#include "storage/stream_positions.h"
 
 namespace fathom::storage {
 namespace {
@@ -60,35 +59,12 @@ std::uint64_t SizeOf(const std::string& path) {
   return error ? 0 : size;
 }
 
-using StreamKey = std::pair<StreamKind, map::SourceId>;
-using Sequence = std::pair<std::uint64_t, std::uint64_t>;  // Epoch first.
-using Positions = std::map<StreamKey, Sequence>;
-
-// Positions only grow: a resend in a batch does not take one back.
-void Raise(Positions& positions, StreamKind stream, const map::SourceId& source,
-           Sequence sequence) {
-  Sequence& held = positions[{stream, source}];
-  held = std::max(held, sequence);
-}
-
-// The positions that a batch reaches.
-Positions PositionsOf(const Batch& batch) {
-  Positions reached;
-  for (const JournalRecord& record : batch.journal) {
-    if (const auto* ping = std::get_if<PingRecord>(&record.event)) {
-      Raise(reached, StreamKind::kPings, ping->source,
-            {ping->epoch, ping->sequence});
-    } else if (const auto* contact =
-                   std::get_if<ContactRecord>(&record.event)) {
-      Raise(reached, StreamKind::kContacts, contact->report.key.source,
-            {contact->epoch, contact->sequence});
-    }
-  }
-  for (const SourcePosition& position : batch.source_positions) {
-    Raise(reached, position.stream, position.source,
-          {position.epoch, position.sequence});
-  }
-  return reached;
+// Damage is told with what to do about it.
+absl::Status ToRepair(const absl::Status& status, const std::string& path) {
+  if (!absl::IsDataLoss(status)) return status;
+  return absl::DataLossError(
+      absl::StrFormat("%s; `fathom mission repair %s NEW` saves what is sound",
+                      status.message(), path));
 }
 
 }  // namespace
@@ -294,7 +270,7 @@ absl::StatusOr<MissionFile::Impl::Outcome> MissionFile::Impl::WriteBatch(
   FATHOM_ASSIGN_OR_RETURN(
       const std::vector<JournalSegment> segments,
       EncodeJournal(std::span(uncovered, batch.journal.end())));
-  outcome.reached = PositionsOf(batch);
+  outcome.reached = PositionsReached(batch);
 
   FATHOM_ASSIGN_OR_RETURN(Transaction transaction, Transaction::Begin(writer_));
   FATHOM_RETURN_IF_ERROR(WriteJournal(segments));
@@ -554,18 +530,20 @@ absl::StatusOr<std::unique_ptr<MissionFile>> MissionFile::Open(
   FATHOM_ASSIGN_OR_RETURN(FileLock lock, FileLock::Acquire(target));
   FATHOM_RETURN_IF_ERROR(CheckHeader(target));
   auto impl = std::make_unique<Impl>(target, std::move(lock));
-  FATHOM_RETURN_IF_ERROR(impl->OpenWriter());
+  FATHOM_RETURN_IF_ERROR(ToRepair(impl->OpenWriter(), target));
   return std::unique_ptr<MissionFile>(new MissionFile(std::move(impl)));
 }
 
 absl::Status MissionFile::Commit(const Batch& batch) {
-  return impl_->Commit(batch);
+  return ToRepair(impl_->Commit(batch), path());
 }
 void MissionFile::LimitHistory(const HistoryLimits& limits) {
   impl_->LimitHistory(limits);
 }
 absl::StatusOr<Loaded> MissionFile::Load(std::uint64_t unpacked_tile_bytes) {
-  return impl_->Load(unpacked_tile_bytes);
+  absl::StatusOr<Loaded> loaded = impl_->Load(unpacked_tile_bytes);
+  if (!loaded.ok()) return ToRepair(loaded.status(), path());
+  return loaded;
 }
 absl::Status MissionFile::CopyLog() { return impl_->CopyLog(); }
 absl::Status MissionFile::Close() { return impl_->Close(); }

@@ -123,7 +123,9 @@ class MissionFile {
   // batch may be committed later), INVALID_ARGUMENT (revisions not
   // ascending), FAILED_PRECONDITION (`previous` is not the view of the file's
   // last checkpoint; a journal that was not loaded), INTERNAL (see promise 1),
-  // DATA_LOSS.
+  // DATA_LOSS (a damaged page or block is in the way; nothing was written, and
+  // nothing that is damaged is written over). DATA_LOSS of Open, Load and
+  // Commit tells how to repair the mission.
   absl::Status Commit(const Batch& batch);
 
   // How much of the contact history is kept (all of it, until this is called).

@@ -47,8 +47,10 @@ absl::StatusCode CodeOf(int result, int system_errno) {
 }
 
 absl::Status ErrorOf(sqlite3* database, int result, std::string_view doing) {
-  const int system_errno =
-      database == nullptr ? 0 : sqlite3_system_errno(database);
+  // A checksum is no matter of the system's: what it said last is of before.
+  const int system_errno = database == nullptr || result == SQLITE_IOERR_DATA
+                               ? 0
+                               : sqlite3_system_errno(database);
   const char* text = result == SQLITE_IOERR_DATA ? "a page fails its checksum"
                      : database == nullptr       ? sqlite3_errstr(result)
                                                  : sqlite3_errmsg(database);

@@ -223,6 +223,16 @@ TEST_F(BufferedStreamTest, ASenderThatWaitsForRoomLearnsOfTheEnd) {
   ExpectEachOnce(full);
 }
 
+// The mission is repaired and served anew; what it has not is sent again.
+TEST_F(BufferedStreamTest, ADamagedMissionIsWaitedFor) {
+  server_.pings.CutAfter(
+      10, grpc::Status(grpc::StatusCode::DATA_LOSS, "page 7"), false);
+  FATHOM_ASSERT_OK_AND_ASSIGN(const auto stream, Open());
+  Send(*stream, 20);
+  FATHOM_ASSERT_OK(stream->Finish());
+  ExpectEachOnce(20);
+}
+
 TEST_F(BufferedStreamTest, WhatNoPatienceMendsEndsIt) {
   server_.pings.CutAfter(
       10, grpc::Status(grpc::StatusCode::INVALID_ARGUMENT, "no such thing"),

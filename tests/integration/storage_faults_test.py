@@ -1,17 +1,21 @@
 """The mission file of a live server: copies and proofs, a full disk, a failed
-fsync, a damaged tile. faulty_disk.cc stands before the C library."""
+fsync, a damaged tile, a damaged page that is to be written. faulty_disk.cc
+stands before the C library."""
 
 import hashlib
+import json
 import os
 import sqlite3
+import subprocess
 import threading
 import unittest
 
 import grpc
 
-from live_server import (DEADLINE_S, LiveTest, Server, ask, import_chart,
-                         ingest, mission, ping, send_pings, start_activity,
-                         types, wait_until)
+from live_server import (DEADLINE_S, FATHOMD, LiveTest, Server, ask,
+                         fix_report, import_chart, ingest, mission, ping,
+                         report_contacts, send_pings, start_activity, types,
+                         wait_until)
 from google.rpc import error_details_pb2, status_pb2
 
 EXHAUSTED = grpc.StatusCode.RESOURCE_EXHAUSTED
@@ -303,6 +307,75 @@ class CopiesAndProofs(LiveTest):
         send_pings(server, [ping(1, [(105, 105, 20.0, 0.5)])])
         self.assertEqual(ask(server, 105, 105).answer.state,
                          types.OBSTACLE_STATE_FREE)
+        self.assertEqual(server.terminate(), 0, server.log())
+
+    def test_damage_in_the_way_of_a_write_stops_ingest_and_no_query(self):
+        with self.new_mission() as server:
+            start_activity(server)
+            send_pings(server, [ping(1, [(105, 105, 20.0, 3.0)])])
+            report_contacts(server, [fix_report(i, 5 * i, second=i)
+                                     for i in range(1, 21)])
+            self.assertEqual(server.terminate(), 0, server.log())
+        path = self.folder / "m.fathom"
+        raw = sqlite3.connect(f"file:{path}?mode=ro", uri=True)
+        [block] = raw.execute("SELECT content FROM contact_history").fetchone()
+        raw.close()
+        content = bytearray(path.read_bytes())
+        self.assertEqual(content.count(block), 1)
+        content[content.index(block) + len(block) // 2] ^= 1
+        path.write_bytes(content)
+
+        # Nothing reads the history at a start, and reports do not write it.
+        server = self.reopen()
+        self.addCleanup(lambda: server.__exit__())
+        self.assertEqual(list(server.status().storage.damage), [])
+        report_contacts(server, [fix_report(i, 5 * i, second=i)
+                                 for i in range(21, 26)])
+        digest = server.status(digest=True).map_digest
+        # A snapshot adds what is new to the contact's last block.
+        lost = grpc.StatusCode.DATA_LOSS
+        error = self.assert_status(
+            lost, server.mission.TransferLocalMap,
+            mission.TransferLocalMapRequest(activity_id="bay"))
+        self.assertIn(f"fathom mission repair {path} NEW", error.details())
+        self.assertEqual(details_of(error)["ErrorInfo"].reason,
+                         "STORAGE_DAMAGED")
+        self.assertNotIn("RetryInfo", details_of(error))
+        self.assertIn("checksum", server.status().storage.fault)
+        self.assert_status(lost, server.ingest.ReportContacts,
+                           ingest.ReportContactsRequest(
+                               reports=[fix_report(26, 130, second=26)]))
+        with self.assertRaises(grpc.RpcError) as caught:
+            send_pings(server, [ping(2, [(105, 105, 20.0, 3.0)])])
+        self.assertEqual(caught.exception.code(), lost)
+        for _ in range(20):
+            answer = ask(server, 125, 25, depth_m=0, second=26).answer
+            self.assertEqual(answer.state, types.OBSTACLE_STATE_OCCUPIED)
+        self.assertEqual(server.terminate(), EXIT_FILE_FAILED, server.log())
+        self.assertIn("fathom mission repair", server.log().splitlines()[-1])
+
+        # What was acknowledged is there, also where it starts again as it is,
+        with self.reopen() as again:
+            self.assertEqual(again.status(digest=True).map_digest, digest)
+        # and repaired, but for the damaged block.
+        done = subprocess.run(
+            [FATHOMD, "mission", "repair", path, self.folder / "new.fathom",
+             "--json"],
+            capture_output=True, text=True, timeout=DEADLINE_S, check=True)
+        repair = json.loads(done.stdout)
+        self.assertEqual(repair["history_rows"], 5)
+        self.assertIn("contact_history", repair["left_out"][0])
+        server = self.reopen("new.fathom")
+        self.assertEqual(server.status(digest=True).map_digest, digest)
+        self.assertEqual(server.status().storage.fault, "")
+        # A resend of all counts what was acknowledged once.
+        answer = report_contacts(server, [fix_report(i, 5 * i, second=i)
+                                          for i in range(1, 27)])
+        self.assertEqual((answer.reports_duplicate, answer.reports_applied),
+                         (25, 1))
+        ack, _ = send_pings(server, [ping(i, [(105, 105, 20.0, 3.0)])
+                                     for i in (1, 2)])
+        self.assertEqual((ack.pings_duplicate, ack.pings_applied), (1, 1))
         self.assertEqual(server.terminate(), 0, server.log())
 
 

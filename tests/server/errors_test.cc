@@ -97,6 +97,8 @@ TEST(Errors, WhatMayPassSaysWhenToTryAgain) {
 TEST(Errors, CodesAreThoseOfTheContract) {
   EXPECT_EQ(ToGrpc(StorageFull("x")).error_code(),
             grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(ToGrpc(StorageDamaged("x")).error_code(),
+            grpc::StatusCode::DATA_LOSS);
   EXPECT_EQ(ToGrpc(ShuttingDown()).error_code(), grpc::StatusCode::UNAVAILABLE);
   EXPECT_EQ(ToGrpc(RevisionNotReached(2, 1)).error_code(),
             grpc::StatusCode::UNAVAILABLE);

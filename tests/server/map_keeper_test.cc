@@ -349,6 +349,32 @@ TEST_F(FatalTest, AnIoErrorEndsWritingForGoodAndIsToldOnce) {
   EXPECT_THAT(store_.seen(), ::testing::IsEmpty());
 }
 
+// Nothing was written, so there is no reason to end the program; it used to.
+TEST_F(FatalTest, DamageInTheWayOfAWriteRefusesIngestAndKeepsQueries) {
+  Submit(PingMessage(1));
+  listener_->AwaitDurable(1);
+  const uint64_t durable = keeper_->storage_state().durable_revision;
+  store_.Fail(absl::DataLossError("page 7; repair it"));
+  Awaited<map::TransferResult> transferred;
+  keeper_->Transfer(kLeg, transferred.Done());
+  EXPECT_THAT(transferred.Await(), StatusIs(absl::StatusCode::kDataLoss));
+  EXPECT_EQ(keeper_->storage_state().fault, "page 7; repair it");
+  EXPECT_TRUE(keeper_->storage_state().damaged);
+  EXPECT_EQ(keeper_->storage_state().durable_revision, durable);
+  EXPECT_THAT(keeper_->Submit(PingMessage(2), listener_),
+              StatusIs(absl::StatusCode::kDataLoss));
+  Awaited<Nothing> refused;
+  keeper_->DropContact({{{"ais"}, {"m0"}}, kStart}, refused.Done());
+  EXPECT_THAT(refused.Await(), StatusIs(absl::StatusCode::kDataLoss));
+  // The middle beam of ping 1, as above.
+  EXPECT_TRUE(
+      keeper_->View()
+          ->SeabedAt({kMiddle.latitude_deg + 4.772e-4, kMiddle.longitude_deg})
+          .has_value());
+  EXPECT_THAT(keeper_->Stop(), StatusIs(absl::StatusCode::kDataLoss));
+  EXPECT_THAT(fatal_, ::testing::IsEmpty());
+}
+
 class BoundedTest : public MapKeeperTest {
  protected:
   BoundedTest() : MapKeeperTest(Small()) {}

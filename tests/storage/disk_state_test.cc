@@ -185,8 +185,9 @@ TEST(DamagedPage, IsNeverWrittenOverUnseen) {
   // The checkpoint has to read the page it writes to.
   while (!onward.batch().checkpoint.has_value()) onward.Step();
   const absl::Status written = file->Commit(onward.batch());
-  EXPECT_THAT(written,
-              StatusIs(absl::StatusCode::kDataLoss, HasSubstr("checksum")));
+  EXPECT_THAT(written, StatusIs(absl::StatusCode::kDataLoss,
+                                AllOf(HasSubstr("checksum"),
+                                      HasSubstr("mission repair " + path))));
   // What was acknowledged is there, and a repair brings the mission back.
   ASSERT_THAT(file->Close(), IsOk());
   file.reset();
