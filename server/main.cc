@@ -134,8 +134,8 @@ void AddFlags(CLI::App& app, Flags& flags) {
       ->type_name("DAYS");
   app.add_option(
          "--history-max-mb", flags.history_max_mb,
-         "Most megabytes of it (1 MB: about 10 000 estimates; what GDAL "
-         "shows of them is a quarter more); the oldest go first")
+         "Most megabytes of it, what GDAL shows of it included (1 MB: about "
+         "10 000 estimates); the oldest go first")
       ->check(CLI::Range(std::uint64_t{1}, kMaxHistoryMb))
       ->group(kHistory)
       ->type_name("MB");

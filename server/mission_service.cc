@@ -214,7 +214,7 @@ grpc::ServerUnaryReactor* MissionService::GetMissionStatus(
   storage->set_fault(state.fault);
   v1::ContactHistoryStatus* history = storage->mutable_contact_history();
   history->set_estimates(file.history.estimates);
-  history->set_bytes(file.history.bytes);
+  history->set_bytes(file.history.bytes());
   history->set_forgotten_estimates(file.history.forgotten_estimates);
   if (file.history_limits.max_age.has_value()) {
     history->set_max_age_s(ToSeconds(*file.history_limits.max_age));

@@ -98,6 +98,7 @@ absl::Status ContactHistory::Write(std::span<const ContactHistoryRow> rows,
 }
 
 void ContactHistory::Committed(std::span<const ContactHistoryRow> rows) {
+  total_ = table_.total();
   MutexLock lock(mutex_);
   if (all_written_) {
     tails_.clear();
@@ -120,9 +121,7 @@ void ContactHistory::Committed(std::span<const ContactHistoryRow> rows) {
 
 void ContactHistory::RolledBack() {
   written_ = 0;
-  // The numbers are told for people and limits; the next commit tells why they
-  // cannot be read.
-  table_.ReloadTotal().IgnoreError();
+  table_.RestoreTotal(total_);
 }
 
 absl::Status ContactHistory::Flush() { return WriteAll(tails_); }

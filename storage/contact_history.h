@@ -66,16 +66,18 @@ class ContactHistory {
   // Contacts that have a tail, in no order.
   std::vector<map::ContactKey> Contacts() const;
   // As of the last commit. Storage thread.
-  const HistoryTotal& total() const { return table_.total(); }
+  const HistoryTotal& total() const { return total_; }
 
  private:
   ContactHistory(HistoryTable table, ContactTable& contacts)
-      : table_(std::move(table)), contacts_(contacts) {}
+      : table_(std::move(table)), contacts_(contacts), total_(table_.total()) {}
   absl::Status WriteAll(const Tails& tails);
   static void Add(std::span<const ContactHistoryRow> rows, Tails& tails);
 
   HistoryTable table_;
   ContactTable& contacts_;
+  // As of the last commit.
+  HistoryTotal total_;
   // Contacts whose tails are full, in the order in which they became so.
   std::deque<map::ContactKey> full_;
   // Written by the transaction under way: the first so many of full_, or all

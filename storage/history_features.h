@@ -7,8 +7,9 @@
 // docs/storage_format.md says what each column means. Written and deleted with
 // the block, in its transaction: they are never of another moment.
 //
-// Cost: 22 bytes an estimate (16 a vertex) and 0.3 us; a point for every
-// estimate would be ten times as much: `fathom mission export` writes those.
+// Cost: 22 bytes of the file an estimate (16 a vertex) and 0.3 us; a point for
+// every estimate would be ten times as much: `fathom mission export` writes
+// those.
 //
 // One thread at a time; inside the caller's transaction.
 
@@ -26,6 +27,11 @@
 #include "storage/sqlite.h"
 
 namespace fathom::storage {
+
+// What a block's two rows take, beside 16 bytes an estimate, where source and
+// contact have names of some 8 letters: times and names as text, the point.
+inline constexpr std::uint64_t kFeatureBlockBytes = 220;
+inline constexpr std::uint64_t kVertexBytes = 16;
 
 // The first format that has these tables.
 inline constexpr int kFirstFeatureVersion = 8;

@@ -114,8 +114,8 @@ absl::StatusOr<HistoryTable> HistoryTable::Create(Connection& connection) {
               "content_bytes = ?, forgotten_count = ?"));
   FATHOM_RETURN_IF_ERROR(
       prepare(table.read_total_,
-              "SELECT estimate_count, content_bytes, forgotten_count FROM "
-              "contact_history_total"));
+              "SELECT estimate_count, content_bytes, forgotten_count, (SELECT "
+              "count(*) FROM contact_history) FROM contact_history_total"));
   return table;
 }
 
@@ -123,7 +123,8 @@ absl::Status HistoryTable::ReloadTotal() {
   FATHOM_ASSIGN_OR_RETURN(const bool row, read_total_.Step());
   if (row) {
     total_ = {.estimates = read_total_.ColumnUint(0),
-              .bytes = read_total_.ColumnUint(1),
+              .blocks = read_total_.ColumnUint(3),
+              .content_bytes = read_total_.ColumnUint(1),
               .forgotten_estimates = read_total_.ColumnUint(2)};
   }
   read_total_.Reset();
@@ -133,7 +134,7 @@ absl::Status HistoryTable::ReloadTotal() {
 
 absl::Status HistoryTable::WriteTotal() {
   write_total_.BindUint(0, total_.estimates);
-  write_total_.BindUint(1, total_.bytes);
+  write_total_.BindUint(1, total_.content_bytes);
   write_total_.BindUint(2, total_.forgotten_estimates);
   return write_total_.Run();
 }
@@ -152,7 +153,7 @@ absl::StatusOr<std::vector<HistoryTable::Block>> HistoryTable::FindJoined(
     if (!more) break;
     const Block block{.id = newest_blocks_.ColumnInt(0),
                       .estimates = newest_blocks_.ColumnUint(1),
-                      .bytes = newest_blocks_.ColumnUint(2)};
+                      .content_bytes = newest_blocks_.ColumnUint(2)};
     const bool small = joined.empty() && block.estimates < kBlockEstimates / 2;
     if (!small && TimeFromUnixMicros(newest_blocks_.ColumnInt(3)) < from) break;
     joined.push_back(block);
@@ -214,15 +215,22 @@ absl::Status HistoryTable::Insert(std::int64_t contact_number,
   insert_place_.BindReal(5, IndexSeconds(mark.first));
   insert_place_.BindReal(6, IndexSeconds(mark.last));
   total_.estimates += rows.size();
-  total_.bytes += content.size();
+  total_.blocks += 1;
+  total_.content_bytes += content.size();
   ++inserted_;
   FATHOM_RETURN_IF_ERROR(insert_place_.Run());
   return features_.Insert(block_id, contact_number, rows, positions);
 }
 
+void HistoryTable::Subtract(const Block& block, HistoryTotal& total) {
+  // What a damaged file says may not add up.
+  total.estimates -= std::min(total.estimates, block.estimates);
+  total.blocks -= std::min<std::uint64_t>(total.blocks, 1);
+  total.content_bytes -= std::min(total.content_bytes, block.content_bytes);
+}
+
 absl::Status HistoryTable::Delete(const Block& block) {
-  total_.estimates -= std::min(total_.estimates, block.estimates);
-  total_.bytes -= std::min(total_.bytes, block.bytes);
+  Subtract(block, total_);
   delete_.BindInt(0, block.id);
   FATHOM_RETURN_IF_ERROR(delete_.Run());
   delete_place_.BindInt(0, block.id);
@@ -244,10 +252,10 @@ absl::Status HistoryTable::Forget(const HistoryLimits& limits) {
   const std::uint64_t most =
       std::max(kMaxForgottenBlocks, 2 * std::exchange(inserted_, 0));
   const bool too_much =
-      limits.max_bytes.has_value() && total_.bytes > *limits.max_bytes;
+      limits.max_bytes.has_value() && total_.bytes() > *limits.max_bytes;
   if (!too_much && !limits.max_age.has_value()) return absl::OkStatus();
   FATHOM_ASSIGN_OR_RETURN(const Time newest, Newest());
-  std::uint64_t bytes = total_.bytes;
+  HistoryTotal left = total_;
   std::vector<Block> oldest;
   oldest_.BindUint(0, most);
   while (true) {
@@ -256,11 +264,11 @@ absl::Status HistoryTable::Forget(const HistoryLimits& limits) {
     const bool too_old =
         limits.max_age.has_value() &&
         newest - TimeFromUnixMicros(oldest_.ColumnInt(3)) > *limits.max_age;
-    if (!too_old && (!too_much || bytes <= *limits.max_bytes)) break;
+    if (!too_old && (!too_much || left.bytes() <= *limits.max_bytes)) break;
     oldest.push_back({.id = oldest_.ColumnInt(0),
                       .estimates = oldest_.ColumnUint(1),
-                      .bytes = oldest_.ColumnUint(2)});
-    bytes -= std::min(bytes, oldest.back().bytes);
+                      .content_bytes = oldest_.ColumnUint(2)});
+    Subtract(oldest.back(), left);
   }
   oldest_.Reset();
   for (const Block& block : oldest) {

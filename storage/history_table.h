@@ -29,9 +29,17 @@ namespace fathom::storage {
 // What the blocks hold, and what was let go (HistoryLimits).
 struct HistoryTotal {
   std::uint64_t estimates = 0;
+  std::uint64_t blocks = 0;
   // Of the blocks' contents.
-  std::uint64_t bytes = 0;
+  std::uint64_t content_bytes = 0;
   std::uint64_t forgotten_estimates = 0;
+
+  // What HistoryLimits::max_bytes counts: contents and features. The latter
+  // are reckoned, not measured.
+  std::uint64_t bytes() const {
+    return content_bytes + kFeatureBlockBytes * blocks +
+           kVertexBytes * estimates;
+  }
 
   friend bool operator==(const HistoryTotal&, const HistoryTotal&) = default;
 };
@@ -77,9 +85,11 @@ class HistoryTable {
                                 std::span<const ContactHistoryRow> rows);
 
   const HistoryTotal& total() const { return total_; }
-  // As it stands in the file: at first, and after a transaction that was
-  // rolled back.
+  // As it stands in the file. Counts the blocks, in the smallest index: 5 ms
+  // for those of 100 M estimates, in memory.
   absl::Status ReloadTotal();
+  // As it was before a transaction that was rolled back.
+  void RestoreTotal(const HistoryTotal& total) { total_ = total; }
 
  private:
   explicit HistoryTable(Connection& connection) : features_(connection) {}
@@ -87,8 +97,10 @@ class HistoryTable {
   struct Block {
     std::int64_t id = 0;
     std::uint64_t estimates = 0;
-    std::uint64_t bytes = 0;
+    std::uint64_t content_bytes = 0;
   };
+  // The total, changed by a block that goes.
+  static void Subtract(const Block& block, HistoryTotal& total);
   absl::StatusOr<std::vector<Block>> FindJoined(std::int64_t contact_number,
                                                 const HistoryTail& tail);
   absl::Status Insert(std::int64_t contact_number,

@@ -120,7 +120,8 @@ class Prover {
       const std::string what =
           WhatOfBlock(select.ColumnInt(1), select.ColumnInt(0));
       total.estimates += select.ColumnUint(5);
-      total.bytes += select.ColumnBlob(6).size();
+      total.blocks += 1;
+      total.content_bytes += select.ColumnBlob(6).size();
       if (select.ColumnInt(7) == 0) Tell(what + ": its contact is missing");
       const auto rows =
           DecodeHistory(select.ColumnBlob(6), select.ColumnInt(1), what);

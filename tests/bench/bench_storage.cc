@@ -201,7 +201,7 @@ class ContactMission {
     if (thousands == 0) return;
     // Full from here on: as much goes as comes.
     file_->LimitHistory(
-        {.max_age = std::nullopt, .max_bytes = file_->Status().history.bytes});
+        {.max_age = std::nullopt, .max_bytes = file_->Status().history.bytes()});
   }
 
   // Seconds that 20 000 durable reports take, a checkpoint and what retention

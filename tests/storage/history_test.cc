@@ -405,6 +405,41 @@ TEST_F(HistoryFileTest, AsMuchGoesAsACheckpointWrites) {
   EXPECT_EQ(total.forgotten_estimates, 1500u);
 }
 
+// The limit counts what GDAL is shown too; it used to count the blocks alone.
+TEST_F(HistoryFileTest, BytesAreThoseOfTheBlocksAndTheirFeatures) {
+  // Full blocks of five contacts, and blocks of one estimate of fifty.
+  for (int i = 0; i < 5 * 512 + 50; ++i) {
+    Report(SampleReport(i, i < 5 * 512 ? "vessel-" + std::to_string(i % 5)
+                                       : "once-" + std::to_string(i)));
+    if (i % 64 == 63) Commit(false);
+  }
+  Commit(true);
+  const HistoryTotal total = file_->Status().history;
+  EXPECT_EQ(total.estimates, 5u * 512 + 50);
+  EXPECT_EQ(total.blocks, 5u * 4 + 50);
+  ASSERT_THAT(file_->Close(), IsOk());
+  file_.reset();
+  {
+    FATHOM_ASSERT_OK_AND_ASSIGN(
+        Connection connection,
+        Connection::Open(path(), Connection::Mode::kReadOnly));
+    FATHOM_ASSERT_OK_AND_ASSIGN(
+        const std::int64_t contents,
+        connection.QueryInt(
+            "SELECT sum(length(content)) FROM contact_history"));
+    EXPECT_EQ(static_cast<std::int64_t>(total.content_bytes), contents);
+    FATHOM_ASSERT_OK_AND_ASSIGN(
+        const std::int64_t features,
+        connection.QueryInt("SELECT sum(payload) FROM dbstat WHERE name IN "
+                            "('tracks', 'track_points')"));
+    EXPECT_NEAR(static_cast<double>(total.bytes() - total.content_bytes),
+                static_cast<double>(features),
+                0.1 * static_cast<double>(features));
+  }
+  FATHOM_ASSERT_OK_AND_ASSIGN(file_, MissionFile::Open(path()));
+  EXPECT_EQ(file_->Status().history, total);
+}
+
 TEST_F(HistoryFileTest, NothingIsReadAfterClose) {
   Report(SampleReport(1, "a"));
   Commit(false);
@@ -560,12 +595,12 @@ TEST_F(HistoryFileTest, WhatIsMoreThanAllowedGoesOldestFirst) {
   Commit(true);
   const HistoryTotal all = file_->Status().history;
   EXPECT_EQ(all.estimates, 1280u);
-  file_->LimitHistory({.max_age = {}, .max_bytes = all.bytes / 2});
+  file_->LimitHistory({.max_age = {}, .max_bytes = all.bytes() / 2});
   Report(SampleReport(1280, "even"));
   Commit(true);
   const HistoryTotal half = file_->Status().history;
-  EXPECT_LE(half.bytes, all.bytes / 2);
-  EXPECT_GT(half.bytes, all.bytes / 3);
+  EXPECT_LE(half.bytes(), all.bytes() / 2);
+  EXPECT_GT(half.bytes(), all.bytes() / 3);
   EXPECT_EQ(half.estimates + half.forgotten_estimates, 1281u);
   // Of both, the newest half.
   for (const char* contact : {"even", "odd"}) {
