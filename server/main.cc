@@ -209,7 +209,12 @@ absl::Status ReadPoint(const char* flag, const std::string& text,
 
 absl::StatusOr<std::unique_ptr<storage::MissionFile>> OpenFile(
     Flags& flags, const Clock& clock) {
-  if (!flags.create) return storage::MissionFile::Open(flags.mission_path);
+  if (!flags.create) {
+    return storage::MissionFile::Open(flags.mission_path,
+                                      {.tell = [](const std::string& line) {
+                                        Log(LogLevel::kInfo, "%s", line);
+                                      }});
+  }
   NewMission& mission = flags.mission;
   FATHOM_RETURN_IF_ERROR(ReadPoint("--center", flags.center, mission.center));
   FATHOM_RETURN_IF_ERROR(

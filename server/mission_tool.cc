@@ -142,9 +142,15 @@ absl::Status ExportTo(const std::string& path, const std::string& to,
   return absl::OkStatus();
 }
 
+storage::MigrationProgress ToldOnStandardError() {
+  return {.tell = [](const std::string& line) {
+    absl::FPrintF(stderr, "fathomd mission: %s\n", line);
+  }};
+}
+
 absl::Status Compact(const std::string& path, Result& out) {
   FATHOM_ASSIGN_OR_RETURN(const std::uint64_t bytes,
-                          storage::CompactMission(path));
+                          storage::CompactMission(path, ToldOnStandardError()));
   out.Count("file_bytes", bytes);
   return absl::OkStatus();
 }
@@ -160,6 +166,7 @@ absl::Status ImportInto(const std::string& from, const std::string& into,
   storage::ImportOptions options;
   options.now = SystemClock().Now();
   options.as_chart = flags.as_chart;
+  options.progress = ToldOnStandardError();
   if (flags.ageing_m2_per_day) {
     options.ageing_m2_s = *flags.ageing_m2_per_day / 86'400;
   }
@@ -210,37 +217,36 @@ int MissionToolMain(int argc, char** argv) {
   add("compact", "Rewrite it without free pages, in place", false,
       [&] { return Compact(path, result); });
   ImportFlags flags;
-  CLI::App* import = app.add_subcommand(
+  CLI::App* import_verb = app.add_subcommand(
       "import", "Merge the map of another mission into this one");
-  import->add_option("FROM", to, "The other mission")->required();
-  import->add_option("INTO", path, "The mission that takes it")->required();
-  import->add_flag("--create", flags.create,
-                   "Make INTO: a new mission with the square of FROM");
-  import->add_flag(
+  import_verb->add_option("FROM", to, "The other mission")->required();
+  import_verb->add_option("INTO", path, "The mission that takes it")
+      ->required();
+  import_verb->add_flag("--create", flags.create,
+                        "Make INTO: a new mission with the square of FROM");
+  import_verb->add_flag(
       "--as-chart", flags.as_chart,
       "As a-priori depths, not as measurements: may share evidence "
       "with INTO, fills only what is unknown there");
-  import->add_option("--ageing-m2-per-day", flags.ageing_m2_per_day,
-                     "Variance that a depth gained per day of its age; by "
-                     "default that of FROM");
-  import->add_flag("--json", json, "One JSON document");
-  import->callback([&] {
-    run = [&] { return ImportInto(to, path, flags, result);
-};
-}  // namespace fathom::server
-);
-try {
-  app.parse(argc, argv);
-} catch (const CLI::ParseError& error) {
-  return app.exit(error) == 0 ? 0 : kExitMisuse;
-}
-const absl::Status status = run();
-if (status.ok() || status.message().empty()) result.Print(json);
-if (status.ok()) return 0;
-if (!status.message().empty()) {
-  absl::FPrintF(stderr, "fathomd mission: %s\n", std::string(status.message()));
-}
-return absl::IsDataLoss(status) ? kExitDamaged : kExitFailed;
+  import_verb->add_option("--ageing-m2-per-day", flags.ageing_m2_per_day,
+                          "Variance that a depth gained per day of its age; by "
+                          "default that of FROM");
+  import_verb->add_flag("--json", json, "One JSON document");
+  import_verb->callback(
+      [&] { run = [&] { return ImportInto(to, path, flags, result); }; });
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kExitMisuse;
+  }
+  const absl::Status status = run();
+  if (status.ok() || status.message().empty()) result.Print(json);
+  if (status.ok()) return 0;
+  if (!status.message().empty()) {
+    absl::FPrintF(stderr, "fathomd mission: %s\n",
+                  std::string(status.message()));
+  }
+  return absl::IsDataLoss(status) ? kExitDamaged : kExitFailed;
 }
 
 }  // namespace fathom::server

@@ -84,7 +84,9 @@ absl::Status CreateFeatureTables(Connection& connection) {
   return connection.Execute(kTables);
 }
 
-absl::Status FillFeatureTables(Connection& connection) {
+absl::Status FillFeatureTables(
+    Connection& connection,
+    const std::function<void(std::uint64_t estimates)>& done) {
   HistoryFeatures features(connection);
   FATHOM_ASSIGN_OR_RETURN(
       Statement select,
@@ -101,6 +103,7 @@ absl::Status FillFeatureTables(Connection& connection) {
     if (!rows.ok()) continue;
     FATHOM_RETURN_IF_ERROR(
         features.Insert(block_id, number, *rows, PositionsOf(*rows)));
+    done(rows->size());
   }
 }
 

@@ -17,6 +17,7 @@
 #define FATHOM_STORAGE_HISTORY_FEATURES_H_
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 
@@ -39,9 +40,12 @@ inline constexpr int kFirstFeatureVersion = 8;
 // Makes the tables, empty.
 absl::Status CreateFeatureTables(Connection& connection);
 
-// Fills the tables, new and empty, from all blocks. Errors: DATA_LOSS: a block
-// is damaged.
-absl::Status FillFeatureTables(Connection& connection);
+// Fills the tables, new and empty, from all blocks; `done` is called for each
+// with its estimates. Errors: those of sqlite.h; a block that cannot be read is
+// left out.
+absl::Status FillFeatureTables(
+    Connection& connection,
+    const std::function<void(std::uint64_t estimates)>& done);
 
 class HistoryFeatures {
  public:

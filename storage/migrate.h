@@ -8,17 +8,29 @@
 #ifndef FATHOM_STORAGE_MIGRATE_H_
 #define FATHOM_STORAGE_MIGRATE_H_
 
+#include <chrono>
+#include <functional>
 #include <string>
 
 #include "absl/status/status.h"
-#include "storage/sqlite.h"
 
 namespace fathom::storage {
 
+class Connection;
+
+// Whom a migration tells what it does: a long history takes minutes.
+struct MigrationProgress {
+  // Called with a line of text for people: at the beginning, at the end, and
+  // while the history is read, at most once in `interval`.
+  std::function<void(const std::string&)> tell = nullptr;
+  std::chrono::milliseconds interval{5000};
+};
+
 // `path` is that of `connection`, the only one. Does nothing to a mission of
-// kSchemaVersion. REQUIRES: CheckVersion is OK. Needs room for two more
-// copies of the mission. Errors: those of sqlite.h.
-absl::Status Migrate(const std::string& path, Connection& connection);
+// kSchemaVersion, and tells nothing. REQUIRES: CheckVersion is OK. Needs room
+// for two more copies of the mission. Errors: those of sqlite.h.
+absl::Status Migrate(const std::string& path, Connection& connection,
+                     const MigrationProgress& progress);
 
 }  // namespace fathom::storage
 

@@ -75,7 +75,7 @@ class MissionFile::Impl {
       : path_(std::move(path)), lock_(std::move(lock)) {}
 
   // REQUIRES: the header has been checked.
-  absl::Status OpenWriter();
+  absl::Status OpenWriter(const MigrationProgress& progress);
 
   absl::Status Commit(const Batch& batch);
   void LimitHistory(const HistoryLimits& limits);
@@ -146,7 +146,7 @@ class MissionFile::Impl {
   MissionFileStatus status_ FATHOM_GUARDED_BY(status_mutex_);
 };
 
-absl::Status MissionFile::Impl::OpenWriter() {
+absl::Status MissionFile::Impl::OpenWriter(const MigrationProgress& progress) {
   FATHOM_ASSIGN_OR_RETURN(
       writer_, Connection::Open(path_, Connection::Mode::kReadWrite));
   FATHOM_RETURN_IF_ERROR(CheckVersion(writer_));
@@ -156,7 +156,7 @@ absl::Status MissionFile::Impl::OpenWriter() {
   // A copy made by other tools may have left the log's mode behind.
   FATHOM_RETURN_IF_ERROR(
       writer_.QueryText("PRAGMA journal_mode = WAL").status());
-  FATHOM_RETURN_IF_ERROR(Migrate(path_, writer_));
+  FATHOM_RETURN_IF_ERROR(Migrate(path_, writer_, progress));
   FATHOM_ASSIGN_OR_RETURN(metadata_, ReadMetadata(writer_));
   FATHOM_ASSIGN_OR_RETURN(const std::vector<SourcePosition> positions,
                           LoadSourcePositions(writer_));
@@ -515,12 +515,12 @@ absl::StatusOr<std::unique_ptr<MissionFile>> MissionFile::Create(
     FATHOM_RETURN_IF_ERROR(draft.Publish());
   }
   auto impl = std::make_unique<Impl>(target, std::move(lock));
-  FATHOM_RETURN_IF_ERROR(impl->OpenWriter());
+  FATHOM_RETURN_IF_ERROR(impl->OpenWriter({}));
   return std::unique_ptr<MissionFile>(new MissionFile(std::move(impl)));
 }
 
 absl::StatusOr<std::unique_ptr<MissionFile>> MissionFile::Open(
-    const std::string& path) {
+    const std::string& path, const MigrationProgress& progress) {
   const std::string target = CanonicalPath(path);
   std::error_code error;
   if (!fs::is_regular_file(target, error)) {
@@ -530,7 +530,7 @@ absl::StatusOr<std::unique_ptr<MissionFile>> MissionFile::Open(
   FATHOM_ASSIGN_OR_RETURN(FileLock lock, FileLock::Acquire(target));
   FATHOM_RETURN_IF_ERROR(CheckHeader(target));
   auto impl = std::make_unique<Impl>(target, std::move(lock));
-  FATHOM_RETURN_IF_ERROR(ToRepair(impl->OpenWriter(), target));
+  FATHOM_RETURN_IF_ERROR(ToRepair(impl->OpenWriter(progress), target));
   return std::unique_ptr<MissionFile>(new MissionFile(std::move(impl)));
 }
 

@@ -37,6 +37,7 @@
 #include "map/contacts/contact.h"
 #include "map/geodesy/ids.h"
 #include "storage/history_table.h"
+#include "storage/migrate.h"
 #include "storage/mission_records.h"
 #include "storage/verify.h"
 
@@ -99,13 +100,15 @@ class MissionFile {
   static absl::StatusOr<std::unique_ptr<MissionFile>> Create(
       const std::string& path, const MissionMetadata& metadata);
 
-  // Opens the mission at `path`; what a crash left in the log is recovered.
+  // Opens the mission at `path`; what a crash left in the log is recovered,
+  // and one of an older format brought to ours (migrate.h), which may take
+  // minutes and tells `progress`.
   //
   // Errors: NOT_FOUND; FAILED_PRECONDITION if it is in use (naming the
   // process), is no mission of ours, or was written by a newer program - the
   // file is then untouched; DATA_LOSS if it is damaged; those of sqlite.h.
   static absl::StatusOr<std::unique_ptr<MissionFile>> Open(
-      const std::string& path);
+      const std::string& path, const MigrationProgress& progress = {});
 
   // Closes as Close does; errors are lost.
   ~MissionFile();

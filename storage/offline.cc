@@ -370,11 +370,12 @@ absl::StatusOr<Repair> RepairMission(const std::string& path,
   return status;
 }
 
-absl::StatusOr<std::uint64_t> CompactMission(const std::string& path) {
+absl::StatusOr<std::uint64_t> CompactMission(
+    const std::string& path, const MigrationProgress& progress) {
   {
     // Recovers what a crash left, and brings an old format to ours.
     FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<MissionFile> file,
-                            MissionFile::Open(path));
+                            MissionFile::Open(path, progress));
     FATHOM_RETURN_IF_ERROR(file->Close());
   }
   FATHOM_ASSIGN_OR_RETURN(const FileLock lock, FileLock::Acquire(path));
@@ -397,7 +398,7 @@ absl::StatusOr<Import> ImportMission(const std::string& from,
   FATHOM_ASSIGN_OR_RETURN(const OtherMission other, ReadOther(from));
   if (!options.create.has_value()) {
     FATHOM_ASSIGN_OR_RETURN(const std::unique_ptr<MissionFile> file,
-                            MissionFile::Open(into));
+                            MissionFile::Open(into, options.progress));
     FATHOM_ASSIGN_OR_RETURN(Import import, MergeInto(other, *file, options));
     FATHOM_RETURN_IF_ERROR(file->Close());
     return import;

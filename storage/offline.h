@@ -18,6 +18,7 @@
 #include "base/time.h"
 #include "map/obstacle_map/obstacle_map.h"
 #include "storage/geopackage.h"
+#include "storage/migrate.h"
 #include "storage/mission_records.h"
 #include "storage/verify.h"
 
@@ -66,7 +67,8 @@ absl::StatusOr<Repair> RepairMission(const std::string& path,
 
 // Rewrites the file without its free pages (a newer format too, if it is old).
 // Returns the bytes it takes after. Needs room for a second copy.
-absl::StatusOr<std::uint64_t> CompactMission(const std::string& path);
+absl::StatusOr<std::uint64_t> CompactMission(
+    const std::string& path, const MigrationProgress& progress = {});
 
 struct ImportOptions {
   // The variance that a depth gained per second of its age, up to now, before
@@ -79,6 +81,8 @@ struct ImportOptions {
   bool as_chart = false;
   // Set: `into` is made, with this mission_id and all else of `from`.
   std::optional<std::string> create = std::nullopt;
+  // Told where `into` is of an older format.
+  MigrationProgress progress = {};
 };
 
 struct Import {

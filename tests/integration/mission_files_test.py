@@ -9,9 +9,9 @@ import sqlite3
 import subprocess
 import unittest
 
-from live_server import (DEADLINE_S, FATHOM, FATHOMD, LiveTest, fix_report,
-                         import_chart, obstacle, ping, report_contacts,
-                         send_pings, start_activity)
+from live_server import (DEADLINE_S, FATHOM, FATHOMD, ROOT, LiveTest,
+                         fix_report, import_chart, obstacle, ping,
+                         report_contacts, send_pings, start_activity)
 
 
 def run(*command):
@@ -114,6 +114,19 @@ class MissionFiles(LiveTest):
             ack, _ = send_pings(server, [ping(i, [(105, 105, 20.0 + i, 3.0)])
                                          for i in range(1, 26)])
             self.assertEqual((ack.pings_duplicate, ack.pings_applied), (20, 5))
+
+    def test_bringing_an_old_format_to_this_one_is_told(self):
+        old = self.folder / "old.fathom"
+        golden = ROOT / "tests" / "golden" / "mission-v7-closed.fathom"
+        shutil.copy(golden, old)
+        with self.reopen("old.fathom") as server:
+            self.assertRegex(server.log(), r"I fathomd: .*is of format 7 and")
+            self.assertRegex(server.log(), r"I fathomd: .*is of format 9 now")
+        old = self.folder / "old2.fathom"
+        shutil.copy(golden, old)
+        done = run(FATHOMD, "mission", "compact", old, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("is of format 9 now", done.stderr)
 
     def test_a_sound_mission_repaired_is_the_same(self):
         fixed = self.folder / "fixed.fathom"

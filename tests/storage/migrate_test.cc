@@ -5,11 +5,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <vector>
 
+#include "absl/strings/str_format.h"
 #include "storage/checked_pages.h"
 #include "storage/mission_file.h"
 #include "storage/offline.h"
@@ -26,9 +29,11 @@ using ::fathom::testing::IsOkAndHolds;
 using ::fathom::testing::StatusIs;
 using ::testing::AnyOf;
 using ::testing::Contains;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
+using ::testing::SizeIs;
 
 std::string ReadAll(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
@@ -174,6 +179,47 @@ TEST(Migrate, DamagedBlockOfVersion7IsToldAndTheRestServed) {
   FATHOM_ASSERT_OK_AND_ASSIGN(const Proof proof,
                               ProveFile(dir.File("repaired")));
   EXPECT_THAT(proof.problems, IsEmpty());
+}
+
+// What Open tells, with so long between two lines at least.
+std::vector<std::string> ToldOf(const std::string& golden,
+                                std::chrono::milliseconds interval) {
+  const TempDir dir;
+  const std::string path = dir.File("m");
+  std::filesystem::copy_file(
+      std::string(FATHOM_SOURCE_DIR "/tests/golden/") + golden, path);
+  std::vector<std::string> told;
+  EXPECT_THAT(
+      MissionFile::Open(
+          path, {.tell = [&](const std::string& line) { told.push_back(line); },
+                 .interval = interval}),
+      IsOk());
+  return told;
+}
+
+// A history of a year took minutes without a word.
+TEST(Migrate, TellsAtItsBeginningItsEndAndNowAndThenBetween) {
+  constexpr std::chrono::milliseconds kNever = std::chrono::hours(1);
+  for (const int version : {5, 6, 7, 8}) {
+    const std::string golden = absl::StrFormat("mission-v%d%s.fathom", version,
+                                               version == 7 ? "-closed" : "");
+    EXPECT_THAT(
+        ToldOf(golden, kNever),
+        ElementsAre(
+            HasSubstr(absl::StrFormat("is of format %d and", version)),
+            HasSubstr(absl::StrFormat("is of format %d now", kSchemaVersion))));
+  }
+  EXPECT_THAT(ToldOf("mission-v9-closed.fathom", kNever), IsEmpty());
+  // 21 rows; two blocks of 10 and 11 estimates, in either order.
+  const auto rows = ToldOf("mission-v6.fathom", std::chrono::milliseconds(0));
+  EXPECT_THAT(rows, SizeIs(2 + 21));
+  EXPECT_THAT(rows[21], HasSubstr("21 estimates"));
+  const auto blocks =
+      ToldOf("mission-v7-closed.fathom", std::chrono::milliseconds(0));
+  ASSERT_THAT(blocks, SizeIs(2 + 2));
+  EXPECT_THAT(blocks[1],
+              AnyOf(HasSubstr("10 of 21 est"), HasSubstr("11 of 21 est")));
+  EXPECT_THAT(blocks[2], HasSubstr("21 of 21 estimates"));
 }
 
 // No contact has older estimates.
