@@ -4,6 +4,7 @@
 #include <array>
 
 namespace fathom::map {
+
 void Contact::Append(const ContactPoint& point,
                      const ContactClassTable& classes) {
   older_.Next(history_, point, classes);

@@ -220,49 +220,67 @@ INSTANTIATE_TEST_SUITE_P(
                       Scene{FilterKind::kPerAxis, 1.5, 400, true}));
 
 // A ship that circles at 5 m/s once in half an hour, always turning the same
-// way where the model expects as much of either: the smoother over all errs
-// too, and the answer not much more.
-TEST(OlderPastOfAManoeuvre, IsHardlyWorseThanTheSmootherOverAll) {
-  std::mt19937_64 random(5);
-  ContactMap map(ContactMapOptions{});
-  Oracle oracle;
-  std::vector<Eigen::Vector4d> truth;
-  int gated = 0;
-  for (int i = 0; i < 2400; ++i) {
-    const double angle = 2 * 3.141592653589793 * i / 1200.0;
-    const Eigen::Vector4d now(3000 + 1432.4 * std::sin(angle),
-                              -1432.4 * std::cos(angle), 5 * std::cos(angle),
-                              5 * std::sin(angle));
-    const ContactOutcome outcome = map.Apply(Hear(random, now, 1.5 * i, 400));
-    if (!outcome.applied) {
-      ++gated;
-      continue;
+// way where the model expects as much of either, heard with this seed.
+struct Circles {
+  explicit Circles(std::uint64_t seed) {
+    std::mt19937_64 random(seed);
+    ContactMap map(ContactMapOptions{});
+    Oracle oracle;
+    std::vector<Eigen::Vector4d> truth;
+    for (int i = 0; i < 2400; ++i) {
+      const double angle = 2 * 3.141592653589793 * i / 1200.0;
+      const Eigen::Vector4d now(3000 + 1432.4 * std::sin(angle),
+                                -1432.4 * std::cos(angle), 5 * std::cos(angle),
+                                5 * std::sin(angle));
+      const ContactOutcome outcome = map.Apply(Hear(random, now, 1.5 * i, 400));
+      if (!outcome.applied) {
+        ++gated;
+        continue;
+      }
+      truth.push_back(now);
+      oracle.filtered.push_back(*outcome.estimate);
     }
-    truth.push_back(now);
-    oracle.filtered.push_back(*outcome.estimate);
+    SmoothAll(oracle);
+    const ContactsView view = map.View();
+    for (std::size_t i = 1000; i < 2100; i += 3) {
+      const ContactEstimate past = *view.At(Key("a"), oracle.filtered[i].time);
+      const Eigen::Vector2d error = ErrorOf(past, truth[i]).head<2>();
+      ours += error.squaredNorm();
+      theirs += ErrorOf(oracle.smoothed[i], truth[i]).head<2>().squaredNorm();
+      // 99 % of the plane's normal.
+      within += error.dot(past.P.topLeftCorner<2, 2>().inverse() * error) < 9.21
+                    ? 1
+                    : 0;
+      ++asked;
+    }
   }
-  EXPECT_LE(gated, 3);
-  SmoothAll(oracle);
-  const ContactsView view = map.View();
+  // Sums of squared errors, m^2.
   double ours = 0;
   double theirs = 0;
   int within = 0;
   int asked = 0;
-  for (std::size_t i = 1000; i < 2100; i += 3) {
-    const ContactEstimate past = *view.At(Key("a"), oracle.filtered[i].time);
-    const Eigen::Vector2d error = ErrorOf(past, truth[i]).head<2>();
-    ours += error.squaredNorm();
-    theirs += ErrorOf(oracle.smoothed[i], truth[i]).head<2>().squaredNorm();
-    // 99 % of the plane's normal.
-    within += error.dot(past.P.topLeftCorner<2, 2>().inverse() * error) < 9.21
-                  ? 1
-                  : 0;
-    ++asked;
+  int gated = 0;
+};
+
+// The smoother over all errs too, and the answer not much more, nor oftener
+// than it says.
+TEST(OlderPastOfAManoeuvre, IsHardlyWorseThanTheSmootherOverAll) {
+  double greatest_ratio = 0;
+  int within = 0;
+  int asked = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const Circles circles(seed);
+    EXPECT_LE(circles.gated, 3) << seed;
+    greatest_ratio =
+        std::max(greatest_ratio, std::sqrt(circles.ours / circles.theirs));
+    within += circles.within;
+    asked += circles.asked;
   }
-  RecordProperty("rms_ratio", std::to_string(std::sqrt(ours / theirs)));
+  RecordProperty("greatest_rms_ratio", std::to_string(greatest_ratio));
   RecordProperty("within_99", std::to_string(double{1} * within / asked));
-  EXPECT_LT(std::sqrt(ours / theirs), 1.3);
-  EXPECT_GT(within, 0.9 * asked);
+  // 1.063 and 0.9973; over 40 seeds 1.063 and 0.9993.
+  EXPECT_LT(greatest_ratio, 1.1);
+  EXPECT_GE(within, 0.99 * asked);
 }
 
 // Drops and returns in the middle of thousands of reports.
