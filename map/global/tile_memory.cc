@@ -152,11 +152,6 @@ std::unique_ptr<const Tile> TileMemory::Decode(const TileSlot& slot) const {
   return Tile::FromContent(slot.key(), *content, {}, tolerance_m_);
 }
 
-bool TileMemory::any_retired() const {
-  MutexLock lock(mutex_);
-  return retired_bytes_ > 0;
-}
-
 TileUse TileMemory::Use() const {
   MutexLock lock(mutex_);
   const std::uint64_t unpacked_bytes =

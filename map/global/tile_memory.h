@@ -97,8 +97,6 @@ class TileMemory {
   bool over_budget() const {
     return clock_bytes_.load(std::memory_order_relaxed) > options_.budget_bytes;
   }
-  // Whether tiles that were evicted wait for somebody's guard.
-  bool any_retired() const FATHOM_EXCLUDES(mutex_);
   TileUse Use() const FATHOM_EXCLUDES(mutex_);
 
  private:

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "server/change_feed.h"
+#include "server/limits.h"
 #include "server/map_keeper.h"
 #include "server/mission.h"
 #include "tests/server/keeper_fakes.h"
@@ -168,6 +169,46 @@ TEST_F(KeeperTilesTest, WhoFollowsTheMapKeepsNoTileUnpacked) {
     (void)ReadAll(*open.keeper->View());
     EXPECT_LE(Settled(*open.keeper).unpacked_bytes, kBudgetBytes);
   }
+}
+
+// Who holds a view keeps every tile that was unpacked since: its answers stay,
+// and no more is packed, and so unpacked again, than TileMemory lets wait.
+TEST_F(KeeperTilesTest, AViewHeldForLongBoundsWhatIsPacked) {
+  constexpr uint64_t kMostRetiredBytes = 16 << 20;
+  Open open = New(kBudgetBytes);
+  Import(*open.keeper);
+  auto held = open.keeper->View();
+  const std::vector<float> depths_m = ReadAll(*held);
+  const uint64_t all_bytes = held->global().tile_use().unpacked_bytes;
+  // Each round another copy of the map waits for the view, until no more may.
+  const auto deadline =
+      std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  uint64_t most_bytes = 0;
+  int rounds = 0;
+  while (most_bytes <= kMostRetiredBytes &&
+         std::chrono::steady_clock::now() < deadline) {
+    ++rounds;
+    ASSERT_EQ(ReadAll(*held), depths_m);
+    (void)open.keeper->NextView(
+        held->revision(),
+        std::chrono::steady_clock::now() + kTileBudgetInterval);
+    most_bytes = std::max(most_bytes, held->global().tile_use().unpacked_bytes);
+  }
+  EXPECT_GT(rounds, 5);
+  EXPECT_GT(most_bytes, kMostRetiredBytes);
+  for (int round = 0; round < 5; ++round) {
+    ASSERT_EQ(ReadAll(*held), depths_m);
+    (void)open.keeper->NextView(
+        held->revision(),
+        std::chrono::steady_clock::now() + 2 * kTileBudgetInterval);
+    // What waited, what the last packing added, and what is at hand.
+    EXPECT_LE(held->global().tile_use().unpacked_bytes,
+              kMostRetiredBytes + 2 * all_bytes);
+  }
+  EXPECT_EQ(held->Digest(), open.keeper->View()->Digest());
+  held.reset();
+  EXPECT_LE(Settled(*open.keeper).unpacked_bytes, kBudgetBytes);
+  EXPECT_EQ(ReadAll(*open.keeper->View()), depths_m);
 }
 
 TEST_F(KeeperTilesTest, ReadersBesideIngestAndTransfersSeeOneMap) {

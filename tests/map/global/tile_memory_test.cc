@@ -127,11 +127,9 @@ TEST_F(TileMemoryTest, CountsWhatIsHeld) {
     EXPECT_EQ(use.packed_tiles, 1u);
     // The evicted one is still there for who holds the guard.
     EXPECT_EQ(use.unpacked_bytes, 2 * tile_bytes_);
-    EXPECT_TRUE(memory_->any_retired());
     guard.reset();
     use = memory_->Use();
     EXPECT_EQ(use.unpacked_bytes, tile_bytes_);
-    EXPECT_FALSE(memory_->any_retired());
     // Key, nine counts, and 4 leaves of 1 + 4 + 2 + 4 bytes: 124; the vector,
     // and two blocks of the allocator's: 56.
     EXPECT_EQ(use.packed_bytes, 8u + 9 * 8 + 4 * 11 + 56);
