@@ -15,6 +15,10 @@ constexpr std::uint64_t kControlBytes = 16;
 // budget, no more is evicted.
 constexpr std::uint64_t kLeastRetiredBytes = 16 << 20;
 
+// Slots that the clock's hand passes before the mutex is let go: readers wait
+// for some microseconds, however many slots there are.
+constexpr std::uint64_t kLooksPerLock = 64;
+
 std::uint64_t BytesOf(const PackedTile& packed) {
   return packed.capacity() + sizeof(PackedTile) + 2 * kAllocationBytes;
 }
@@ -52,7 +56,9 @@ void TileMemory::Unlink(const TileSlot& slot) {
 
 std::shared_ptr<const TileSlot> TileMemory::NextVictim(std::uint64_t& steps) {
   MutexLock lock(mutex_);
-  for (; steps > 0 && hand_ != nullptr; --steps) {
+  if (hand_ == nullptr) steps = 0;
+  const std::uint64_t last = steps - std::min(steps, kLooksPerLock);
+  for (; steps > last && hand_ != nullptr; --steps) {
     const TileSlot* const slot = hand_;
     hand_ = slot->next_;
     if (slot->touched_.exchange(false, std::memory_order_relaxed)) continue;
@@ -71,6 +77,7 @@ void TileMemory::Retire(const TileSlot& slot) {
   ++packed_tiles_;
   if (generations_.empty()) return;
   retired_bytes_ += slot.totals_.memory_bytes;
+  generations_.back().retired_bytes += slot.totals_.memory_bytes;
   generations_.back().retired.push_back(std::move(tile));
 }
 
@@ -87,9 +94,9 @@ bool TileMemory::Evict() {
     steps = 2 * clock_tiles_;
   }
   bool any = false;
-  while (over_budget()) {
+  while (over_budget() && steps > 0) {
     const std::shared_ptr<const TileSlot> victim = NextVictim(steps);
-    if (victim == nullptr) break;
+    if (victim == nullptr) continue;
     if (victim->packed_.load(std::memory_order_relaxed) == nullptr) {
       // Only this thread clears `live_`.
       const Tile& tile = *victim->live_.load(std::memory_order_acquire);
@@ -227,9 +234,7 @@ void TileMemory::EndGeneration(Generation* generation) {
   MutexLock lock(mutex_);
   generation->held = false;
   while (!generations_.empty() && !generations_.front().held) {
-    for (const auto& tile : generations_.front().retired) {
-      retired_bytes_ -= tile->memory_bytes();
-    }
+    retired_bytes_ -= generations_.front().retired_bytes;
     freed.push_back(std::move(generations_.front().retired));
     generations_.pop_front();
   }

@@ -107,6 +107,8 @@ class TileMemory {
   struct Generation {
     bool held = true;
     std::vector<std::unique_ptr<const Tile>> retired;
+    // Of these.
+    std::uint64_t retired_bytes = 0;
   };
 
   bool MayPack(const Tile& tile) const {
@@ -124,7 +126,8 @@ class TileMemory {
   void Link(const TileSlot& slot) FATHOM_REQUIRES(mutex_);
   void Unlink(const TileSlot& slot) FATHOM_REQUIRES(mutex_);
   // The next slot on the clock that was not read since it was last looked at;
-  // null: none within `steps`, which counts down.
+  // null: none among the next kLooksPerLock, or within `steps`, which counts
+  // down.
   std::shared_ptr<const TileSlot> NextVictim(std::uint64_t& steps)
       FATHOM_EXCLUDES(mutex_);
   void Retire(const TileSlot& slot) FATHOM_EXCLUDES(mutex_);

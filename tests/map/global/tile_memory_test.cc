@@ -99,6 +99,22 @@ TEST_F(TileMemoryTest, TheClockSparesWhatWasReadSinceItCame) {
   EXPECT_FALSE(fifth->packed());
 }
 
+// The hand passes 64 slots at a time: of 200 that all were read it goes a whole
+// round, over pieces that have no victim, and then packs the first 150.
+TEST_F(TileMemoryTest, GoesAsFarRoundTheClockAsItMust) {
+  Budget(50);
+  std::vector<Slot> slots;
+  for (std::uint32_t i = 0; i < 200; ++i) {
+    slots.push_back(Add(i, 10));
+    (void)slots.back()->tile();
+  }
+  EXPECT_TRUE(memory_->Evict());
+  EXPECT_EQ(memory_->Use().unpacked_tiles, 50u);
+  for (std::size_t i = 0; i < slots.size(); ++i) {
+    EXPECT_EQ(slots[i]->packed(), i < 150) << i;
+  }
+}
+
 TEST_F(TileMemoryTest, EvictsNoMoreThanTheBudgetAsks) {
   Budget(2);
   std::vector<Slot> slots;
