@@ -200,8 +200,8 @@ class ContactMission {
     CheckpointNow();
     if (thousands == 0) return;
     // Full from here on: as much goes as comes.
-    file_->LimitHistory(
-        {.max_age = std::nullopt, .max_bytes = file_->Status().history.bytes()});
+    file_->LimitHistory({.max_age = std::nullopt,
+                         .max_bytes = file_->Status().history.bytes()});
   }
 
   // Seconds that 20 000 durable reports take, a checkpoint and what retention

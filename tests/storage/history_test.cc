@@ -1,5 +1,4 @@
-// The contact history in blocks: codec, tails, and the file against a list
-// that is kept plainly.
+// The contact history in a mission file against a list that is kept plainly.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -17,7 +16,6 @@
 
 #include "storage/history_codec.h"
 #include "storage/history_replay.h"
-#include "storage/history_tail.h"
 #include "storage/mission_file.h"
 #include "storage/offline.h"
 #include "storage/restore.h"
@@ -36,91 +34,6 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
-
-Time At(int s) {
-  return TimeFromUnixMicros(1'000'000'000'000'000 + s * 1'000'000ll);
-}
-
-ContactHistoryRow Row(int s, std::uint64_t revision, bool revises = false) {
-  ContactHistoryRow row{
-      .revision = revision, .estimate = {}, .revises = revises};
-  static_cast<map::ContactPoint&>(row.estimate) = SampleContactPoint(1);
-  row.estimate.time = At(s);
-  return row;
-}
-
-std::vector<std::pair<int, int>> TimesAndRevisions(
-    const std::vector<ContactHistoryRow>& rows) {
-  std::vector<std::pair<int, int>> found;
-  for (const ContactHistoryRow& row : rows) {
-    found.emplace_back(
-        static_cast<int>((row.estimate.time - At(0)).count() / 1'000'000),
-        static_cast<int>(row.revision));
-  }
-  return found;
-}
-
-TEST(HistoryCodec, BlockComesBackBitForBitWithTheNamesOfItsTime) {
-  const std::vector<map::ContactKey> names = {
-      {.source = {"ais"}, .contact = {"235000001"}}};
-  std::vector<ContactHistoryRow> rows;
-  for (int i = 0; i < static_cast<int>(kMaxBlockEstimates); ++i) {
-    rows.push_back(Row(i / 2, static_cast<std::uint64_t>(i)));
-    // None, a name, none, and the name again at the end.
-    if ((i >= 10 && i < 20) || i == 255) rows.back().estimate.linked = names;
-  }
-  const Bytes blob = EncodeHistory(7, rows);
-  FATHOM_ASSERT_OK_AND_ASSIGN(const std::vector<ContactHistoryRow> back,
-                              DecodeHistory(blob, 7, "block"));
-  ASSERT_EQ(back.size(), rows.size());
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    EXPECT_EQ(back[i].revision, rows[i].revision);
-    EXPECT_EQ(back[i].estimate, rows[i].estimate) << i;
-  }
-  EXPECT_THAT(DecodeHistory(blob, 8, "block"),
-              StatusIs(absl::StatusCode::kDataLoss,
-                       HasSubstr("holds contact_number=7")));
-}
-
-TEST(HistoryCodec, WhatNoEncoderWroteIsRefused) {
-  std::vector<ContactHistoryRow> rows = {Row(1, 1), Row(2, 2)};
-  std::swap(rows[0], rows[1]);
-  EXPECT_THAT(DecodeHistory(EncodeHistory(7, rows), 7, "block"),
-              StatusIs(absl::StatusCode::kDataLoss));
-  const Bytes blob = EncodeHistory(7, std::vector{Row(1, 1)});
-  for (std::size_t size = 0; size < blob.size(); ++size) {
-    EXPECT_THAT(DecodeHistory(ByteSpan(blob).first(size), 7, "block"),
-                StatusIs(absl::StatusCode::kDataLoss))
-        << size;
-  }
-}
-
-TEST(HistoryTail, RevisedRowsTakeThePlaceOfOnesOfBefore) {
-  HistoryTail tail;
-  for (const auto& row : {Row(10, 1), Row(20, 2), Row(30, 3)}) tail.Add(row);
-  EXPECT_FALSE(tail.cut.has_value());
-  // The report of 15 s came as revision 4.
-  for (const auto& row : {Row(10, 4, true), Row(15, 4), Row(20, 4)}) {
-    tail.Add(row);
-  }
-  EXPECT_THAT(
-      TimesAndRevisions(tail.rows),
-      ElementsAre(std::pair(10, 4), std::pair(15, 4), std::pair(20, 4)));
-  EXPECT_TRUE(tail.Stands(Row(9, 1)));
-  EXPECT_FALSE(tail.Stands(Row(10, 1)));
-}
-
-TEST(HistoryTail, RowsAreInOrderAndOfOneTimeAndRevisionTheLastStays) {
-  HistoryTail tail;
-  for (const auto& row : {Row(20, 2), Row(10, 3), Row(20, 1)}) tail.Add(row);
-  ContactHistoryRow last = Row(10, 3);
-  last.estimate.radius_m = 77;
-  tail.Add(last);
-  EXPECT_THAT(
-      TimesAndRevisions(tail.rows),
-      ElementsAre(std::pair(10, 3), std::pair(20, 1), std::pair(20, 2)));
-  EXPECT_EQ(tail.rows[0].estimate.radius_m, 77);
-}
 
 // A mission, its map, and what its history must be.
 class HistoryFileTest : public ::testing::Test {
@@ -307,7 +220,7 @@ TEST_F(HistoryFileTest, AreaAndTimeFindWhatAPlainSearchFinds) {
                      .west_deg = longitude(random),
                      .east_deg = longitude(random)};
     area.north_deg = area.south_deg + 20;
-    const Time from = At(200 + 30 * i);
+    const Time from = HistoryTime(200 + 30 * i);
     const Time to = from + std::chrono::seconds(500);
     std::vector<map::ContactEstimate> expected;
     for (const auto& [key, kept] : kept_) {
@@ -378,14 +291,15 @@ TEST_F(HistoryFileTest, WhatIsOlderThanAllowedGoesWithACheckpoint) {
 
 // A ping's clock says nothing of the contacts: one of 2090 would let all go.
 TEST_F(HistoryFileTest, AgeIsBesideTheNewestEstimateWhateverTheMapSays) {
-  ASSERT_THAT(map_->RestoreRevision(0, At(0) + std::chrono::years(80)), IsOk());
+  ASSERT_THAT(map_->RestoreRevision(0, HistoryTime(0) + std::chrono::years(80)),
+              IsOk());
   saved_ = map_->View();
   file_->LimitHistory({.max_age = std::chrono::seconds(300), .max_bytes = {}});
   for (int i = 0; i < 100; ++i) Report(SampleReport(i, "a"));
   Commit(true);
   Report(SampleReport(100, "a"));
   Commit(true);
-  EXPECT_EQ(saved_->as_of(), At(0) + std::chrono::years(80));
+  EXPECT_EQ(saved_->as_of(), HistoryTime(0) + std::chrono::years(80));
   const HistoryTotal total = file_->Status().history;
   EXPECT_EQ(total.forgotten_estimates, 0u);
   EXPECT_EQ(total.estimates, 101u);
@@ -395,7 +309,7 @@ TEST_F(HistoryFileTest, AgeIsBesideTheNewestEstimateWhateverTheMapSays) {
 TEST_F(HistoryFileTest, AsMuchGoesAsACheckpointWrites) {
   file_->LimitHistory({.max_age = {}, .max_bytes = 0});
   for (int i = 0; i < 1500; ++i) {
-    batch_.contact_history.push_back(Row(i, 1));
+    batch_.contact_history.push_back(SampleHistoryRow(i, 1));
     batch_.contact_history.back().estimate.key = {
         .source = {"c4i"}, .contact = {std::to_string(i)}};
   }

@@ -102,6 +102,20 @@ inline map::ContactPoint SampleContactPoint(int number) {
   return point;
 }
 
+// What was believed at a second after the first.
+inline Time HistoryTime(int s) {
+  return TimeFromUnixMicros(1'000'000'000'000'000 + s * 1'000'000ll);
+}
+
+inline ContactHistoryRow SampleHistoryRow(int s, std::uint64_t revision,
+                                          bool revises = false) {
+  ContactHistoryRow row{
+      .revision = revision, .estimate = {}, .revises = revises};
+  static_cast<map::ContactPoint&>(row.estimate) = SampleContactPoint(1);
+  row.estimate.time = HistoryTime(s);
+  return row;
+}
+
 }  // namespace fathom::storage
 
 #endif  // FATHOM_TESTS_STORAGE_SAMPLE_RECORDS_H_
