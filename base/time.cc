@@ -17,12 +17,6 @@ using std::chrono::seconds;
 using std::chrono::sys_days;
 using std::chrono::year_month_day;
 
-constexpr Time kFirst =
-    sys_days(std::chrono::year(0) / std::chrono::January / 1);
-constexpr Time kLast =
-    sys_days(std::chrono::year(10000) / std::chrono::January / 1) -
-    microseconds(1);
-
 // Digits past the sixth would be below our resolution; nine (nanoseconds) is
 // what other programs write.
 constexpr int kMaxFractionDigits = 9;
@@ -128,7 +122,7 @@ std::optional<Duration> TakeOffset(Reader& reader) {
 }  // namespace
 
 std::string FormatTime(Time time) {
-  time = std::clamp(time, kFirst, kLast);
+  time = std::clamp(time, kFirstTime, kLastTime);
   const sys_days day = std::chrono::floor<days>(time);
   const year_month_day date(day);
   const std::chrono::hh_mm_ss<microseconds> clock(time - day);

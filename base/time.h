@@ -41,10 +41,18 @@ constexpr double ToSeconds(Duration span) {
   return std::chrono::duration<double>(span).count();
 }
 
+// The first and the last moment that text can say, years 0 and 9999. Spans
+// between such are far from overflow; times from a file are held to them.
+inline constexpr Time kFirstTime =
+    std::chrono::sys_days(std::chrono::year(0) / std::chrono::January / 1);
+inline constexpr Time kLastTime =
+    std::chrono::sys_days(std::chrono::year(10000) / std::chrono::January / 1) -
+    Duration(1);
+
 // Writes `time` as RFC 3339 in UTC: "2002-05-24T16:05:09Z", with three or six
 // fraction digits only where they are needed ("...09.250Z",
-// "...09.000001Z"). REQUIRES: the year of `time` is 0 to 9999; other times are
-// clamped to the first or last representable moment.
+// "...09.000001Z"). REQUIRES: kFirstTime <= time <= kLastTime; other times
+// are clamped to them.
 std::string FormatTime(Time time);
 
 // Reads an RFC 3339 date-time: "2002-05-24T12:05:09.25-04:00". The `T` and

@@ -20,6 +20,15 @@ void ByteWriter::PutString(std::string_view text) {
   bytes_.insert(bytes_.end(), text.begin(), text.end());
 }
 
+Time ByteReader::GetTime() {
+  const Time time = TimeFromUnixMicros(GetI64());
+  if (time < kFirstTime || time > kLastTime) {
+    ok_ = false;
+    return {};
+  }
+  return time;
+}
+
 bool ByteReader::GetBool() {
   const std::uint8_t value = GetU8();
   if (value > 1) ok_ = false;

@@ -99,7 +99,8 @@ class ByteReader {
   }
   float GetF32() { return std::bit_cast<float>(GetU32()); }
   double GetF64() { return std::bit_cast<double>(GetU64()); }
-  Time GetTime() { return TimeFromUnixMicros(GetI64()); }
+  // Fails outside [kFirstTime, kLastTime]: what follows computes spans.
+  Time GetTime();
   // Fails on anything but 0 and 1, so that one content has one encoding.
   bool GetBool();
   std::uint64_t GetVarint();
