@@ -149,6 +149,9 @@ class Contact {
   void set_links(std::shared_ptr<const ContactLinks> links) {
     links_ = std::move(links);
   }
+  // Where the spatial index has it (SpatialEntry::code).
+  std::uint64_t index_code() const { return index_code_; }
+  void set_index_code(std::uint64_t code) { index_code_ = code; }
 
  private:
   // All estimates in memory, oldest first.
@@ -170,6 +173,7 @@ class Contact {
   TrackHistory history_;
   RecentReports recent_;
   std::shared_ptr<const ContactLinks> links_;
+  std::uint64_t index_code_ = 0;
 };
 
 // Estimates ahead that the past is smoothed by. Where there are more of the

@@ -351,7 +351,7 @@ ContactOutcome ContactMap::Drop(const ContactKey& named, Time time) {
 }
 
 ContactsView ContactMap::View() {
-  if (set_->epoch == epoch_) set_->index.Settle();
+  if (set_->epoch == epoch_) set_->Settle();
   ++epoch_;
   return ContactsView(set_);
 }

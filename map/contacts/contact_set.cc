@@ -52,25 +52,22 @@ const Contact& ContactSet::Change(const Place& place, ContactChange kind,
                                   absl::FunctionRef<void(Contact&)> change) {
   HeldContact& held = OwnBlock(place.block).contacts[place.slot];
   const bool was_live = !held.contact->dropped();
-  // The copy is found in the index by the one that it is of, which others may
-  // have let go.
   const std::shared_ptr<Contact> before = held.contact;
-  std::optional<SpatialEntry> entry = index.Find(before.get(), held.code);
   if (held.epoch != epoch) {
-    held.contact = std::make_shared<Contact>(*held.contact);
+    held.contact = std::make_shared<Contact>(*before);
     held.epoch = epoch;
+    held.unsettled = 0;
   }
+  if (held.unsettled == 0) {
+    unsettled.push_back({.contact = held.contact.get(), .indexed = before});
+    held.unsettled = unsettled.size();
+  }
+  UnsettledContact& told = unsettled[held.unsettled - 1];
   const std::size_t older = held.contact->older().size();
   change(*held.contact);
-  if (kind == ContactChange::kReports && entry.has_value()) {
-    entry->contact = held.contact.get();
-  } else {
-    if (held.contact->older().size() < older) entry.reset();
-    entry = MakeSpatialEntry(*held.contact, *classes, entry,
-                             kind == ContactChange::kAppend);
-  }
-  index.Replace(before.get(), held.code, *entry, epoch);
-  held.code = entry->code;
+  if (kind == ContactChange::kAppend) ++told.appended;
+  told.revised = told.revised || kind == ContactChange::kRevise ||
+                 held.contact->older().size() < older;
   if (was_live) --live_count;
   if (!held.contact->dropped()) ++live_count;
   return *held.contact;
@@ -79,12 +76,12 @@ const Contact& ContactSet::Change(const Place& place, ContactChange kind,
 void ContactSet::Add(std::shared_ptr<Contact> contact) {
   const Place place = Find(contact->key());
   const SpatialEntry entry =
-      MakeSpatialEntry(*contact, *classes, std::nullopt, false);
+      MakeSpatialEntry(*contact, *classes, std::nullopt, 0);
   index.Insert(entry, epoch);
+  contact->set_index_code(entry.code);
   ++size;
   if (!contact->dropped()) ++live_count;
-  HeldContact held{
-      .contact = std::move(contact), .epoch = epoch, .code = entry.code};
+  HeldContact held{.contact = std::move(contact), .epoch = epoch};
   if (blocks.empty()) {
     blocks.push_back(std::make_shared<ContactBlock>());
     blocks.back()->epoch = epoch;
@@ -109,13 +106,36 @@ void ContactSet::Erase(const ContactKey& key) {
   ContactBlock& block = OwnBlock(place.block);
   const auto held =
       block.contacts.begin() + static_cast<std::ptrdiff_t>(place.slot);
-  index.Remove(held->contact.get(), held->code, epoch);
+  const Contact* indexed = held->contact.get();
+  if (held->epoch == epoch && held->unsettled > 0) {
+    UnsettledContact& told = unsettled[held->unsettled - 1];
+    told.contact = nullptr;
+    indexed = told.indexed.get();
+  }
+  index.Remove(indexed, held->contact->index_code(), epoch);
   --size;
   if (!held->contact->dropped()) --live_count;
   block.contacts.erase(held);
   if (block.contacts.empty()) {
     blocks.erase(blocks.begin() + static_cast<std::ptrdiff_t>(place.block));
   }
+}
+
+void ContactSet::Settle() {
+  for (const UnsettledContact& told : unsettled) {
+    if (told.contact == nullptr) continue;
+    const std::uint64_t code = told.contact->index_code();
+    std::optional<SpatialEntry> entry = index.Find(told.indexed.get(), code);
+    if (told.revised) entry.reset();
+    if (told.appended > 0 || !entry.has_value()) {
+      entry = MakeSpatialEntry(*told.contact, *classes, entry, told.appended);
+    }
+    entry->contact = told.contact;
+    index.Replace(told.indexed.get(), code, *entry, epoch);
+    told.contact->set_index_code(entry->code);
+  }
+  unsettled.clear();
+  index.Settle();
 }
 
 }  // namespace fathom::map

@@ -28,8 +28,20 @@ struct HeldContact {
   // Shared with views; changed only in its own epoch.
   std::shared_ptr<Contact> contact;
   std::uint64_t epoch = 0;
-  // Its code in the spatial index.
-  std::uint64_t code = 0;
+  // 1 + its place in ContactSet::unsettled, 0: none. Of its own epoch only.
+  std::size_t unsettled = 0;
+};
+
+// A contact that was changed since the index was told of it.
+struct UnsettledContact {
+  // nullptr: forgotten since.
+  Contact* contact = nullptr;
+  // By which the index knows it.
+  std::shared_ptr<const Contact> indexed;
+  // Estimates appended since; `revised`: other things were done to its history,
+  // or older estimates were let go.
+  std::size_t appended = 0;
+  bool revised = false;
 };
 
 // Contacts in order of key; never empty.
@@ -50,6 +62,8 @@ struct ContactSet {
   // In order of key.
   std::vector<std::shared_ptr<ContactBlock>> blocks;
   SpatialIndex index;
+  // Of this epoch.
+  std::vector<UnsettledContact> unsettled;
   std::size_t size = 0;
   std::size_t live_count = 0;
   std::size_t max_contacts = 0;
@@ -75,6 +89,10 @@ struct ContactSet {
   void Add(std::shared_ptr<Contact> contact);
   // Forgets the contact. REQUIRES: held.
   void Erase(const ContactKey& key);
+  // Tells the index what was changed: once a contact, however many reports
+  // came about it. To be called before the set is shared; nothing is changed in
+  // this epoch after it.
+  void Settle();
 
  private:
   ContactBlock& OwnBlock(std::size_t block);

@@ -54,8 +54,13 @@ double GreatestStd(const Eigen::Matrix4d& P, int first) {
 
 // After how many reports the reach into the past is made afresh, over the
 // newest estimates and over the older ones.
-constexpr std::uint64_t kAfresh = 32;
+constexpr std::uint64_t kAfresh = 128;
 constexpr std::uint64_t kOlderAfresh = 512;
+
+// Whether a multiple of `step` is among the newest `appended` of `count`.
+bool Crosses(std::uint64_t count, std::uint64_t appended, std::uint64_t step) {
+  return count / step != (count - appended) / step;
+}
 
 // A little more than the value, to cover the rounding to float.
 float Above(double value) { return static_cast<float>(value * 1.000001); }
@@ -144,16 +149,25 @@ double PastAfresh(const Contact& contact, const UnitVector& place,
   return past_m;
 }
 
-// The same from the entry before the newest estimate came, at least as wide.
-double PastFrom(const TrackHistory& history, const SpatialEntry& before,
-                double moved_m) {
-  const ContactPoint& last = history[history.size() - 2];
-  // What ReachOf(last) said, rounded up; of a drop, where it is nowhere, 0.
+// The same from the entry before the newest `appended` came, at least as wide.
+// REQUIRES: appended < history.size().
+double PastFrom(const TrackHistory& history, std::size_t appended,
+                const SpatialEntry& before, double moved_m,
+                const UnitVector& place, const ContactClassTable& classes) {
+  const std::size_t last = history.size() - 1 - appended;
+  // What ReachOf(history[last]) said, rounded up; of a drop, where it is
+  // nowhere, 0.
   const Reach reach{.base_m = before.bounds.base_m,
                     .speed_m_s = before.bounds.speed_m_s,
                     .wander_m_s15 = before.bounds.wander_m_s15};
-  return moved_m + std::max(static_cast<double>(before.bounds.past_m),
-                            ReachUntil(last, reach, history.newest()));
+  double past_m =
+      moved_m + std::max(static_cast<double>(before.bounds.past_m),
+                         ReachUntil(history[last], reach, history[last + 1]));
+  for (std::size_t i = last + 1; i + 1 < history.size(); ++i) {
+    past_m = std::max(past_m, PastOf(history[i], &history[i + 1], false,
+                                     history.newest(), place, classes));
+  }
+  return past_m;
 }
 
 // SpatialBounds::older_m.
@@ -251,7 +265,7 @@ bool SpatialBounds::MayReach(const UnitVector& at, double reach_m,
 SpatialEntry MakeSpatialEntry(const Contact& contact,
                               const ContactClassTable& classes,
                               const std::optional<SpatialEntry>& before,
-                              bool appended) {
+                              std::size_t appended) {
   const TrackHistory& history = contact.history();
   const ContactPoint& newest = history.newest();
   const GeodeticPoint place = newest.Position();
@@ -268,15 +282,17 @@ SpatialEntry MakeSpatialEntry(const Contact& contact,
     bounds.speed_m_s = Above(reach.speed_m_s);
     bounds.wander_m_s15 = Above(reach.wander_m_s15);
   }
+  // Of more than are kept, some left unseen.
+  const bool follows = before.has_value() && appended < history.size();
   const double moved_m =
-      before.has_value() ? DistanceM(bounds.low, before->bounds.low) : 0.0;
-  bounds.past_m =
-      Above(appended && before.has_value() && newest.report_count % kAfresh != 0
-                ? PastFrom(history, *before, moved_m)
-                : PastAfresh(contact, bounds.low, classes));
+      follows ? DistanceM(bounds.low, before->bounds.low) : 0.0;
+  bounds.past_m = Above(
+      follows && !Crosses(newest.report_count, appended, kAfresh)
+          ? PastFrom(history, appended, *before, moved_m, bounds.low, classes)
+          : PastAfresh(contact, bounds.low, classes));
   if (contact.older().empty()) return entry;
   bounds.older_m =
-      Above(before.has_value() && newest.report_count % kOlderAfresh != 0
+      Above(follows && !Crosses(newest.report_count, appended, kOlderAfresh)
                 ? OlderFrom(*before, moved_m)
                 : OlderAfresh(contact, bounds.low, classes));
   bounds.all_since = history[0].time;

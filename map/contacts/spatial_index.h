@@ -15,6 +15,7 @@
 #define FATHOM_MAP_CONTACTS_SPATIAL_INDEX_H_
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -80,15 +81,15 @@ struct SpatialEntry {
   SpatialBounds bounds;
 };
 
-// The entry for a contact. `before`: its entry before its newest estimates
-// came, if it had one and no older estimate was let go since. `appended`: one
-// came, and nothing else changed; what is said of the newest estimates then
-// follows from `before` in O(1), a little wider, but every 32nd time. What is
-// said of the older ones does, but every 512th time. Else O(estimates kept).
+// The entry for a contact. `before`: its entry when the newest `appended`
+// estimates had not come, if it had one and nothing else was done to its
+// estimates since. What is said of the newest then follows from `before` in
+// O(appended), a little wider, but once in 32 reports; what is said of the
+// older, but once in 512. Else O(estimates kept).
 SpatialEntry MakeSpatialEntry(const Contact& contact,
                               const ContactClassTable& classes,
                               const std::optional<SpatialEntry>& before,
-                              bool appended);
+                              std::size_t appended);
 
 class SpatialIndex {
  public:

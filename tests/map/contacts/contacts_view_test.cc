@@ -181,6 +181,59 @@ TEST(ContactsView, IndexMissesNothingAtAnyTime) {
   EXPECT_GT(found, 5000u);
 }
 
+// The index hears of a contact once a view: of one report, of several, of more
+// than are kept, of late ones, ends, new lives, and of contacts that were
+// forgotten meanwhile.
+TEST(ContactsView, IndexMissesNothingAfterAnyNumberOfReports) {
+  std::mt19937_64 random(31);
+  std::uniform_real_distribution<double> unit(0, 1);
+  constexpr int kNames = 60;
+  ContactMap map(ContactMapOptions{.max_contacts = 25});
+  std::vector<GeodeticPoint> places(kNames);
+  for (GeodeticPoint& place : places) {
+    place = Direct(kBay, 360 * unit(random), 50'000 * unit(random));
+  }
+  double at_s = 0;
+  std::size_t found = 0;
+  for (int round = 0; round < 150; ++round) {
+    // Bursts of one contact, or a few reports of many.
+    const int bursts = 1 + static_cast<int>(6 * unit(random));
+    for (int burst = 0; burst < bursts; ++burst) {
+      const auto i = static_cast<std::size_t>(kNames * unit(random));
+      const std::string name = std::to_string(i);
+      const int reports = static_cast<int>(600 * std::pow(unit(random), 4)) + 1;
+      const double course_deg = 360 * unit(random);
+      for (int report = 0; report < reports; ++report) {
+        at_s += 0.5 * unit(random);
+        places[i] = Direct(places[i], course_deg, 5);
+        const double late_s = unit(random) < 0.02 ? 40 * unit(random) : 0;
+        ContactReport next = unit(random) < 0.3
+                                 ? Fix(name, at_s - late_s, places[i], 8, -3)
+                                 : Heard(name, at_s - late_s, places[i], 50, 0);
+        next.inactive = unit(random) < 0.005;
+        map.Apply(next);
+      }
+      // All that are alive are stale: then they make room and are forgotten.
+      if (unit(random) < 0.05) at_s += 100'000;
+    }
+    const ContactsView view = map.View();
+    for (int question = 0; question < 4; ++question) {
+      const double t = unit(random) < 0.7
+                           ? at_s - 2000 * std::pow(unit(random), 3)
+                           : at_s + 2000 * unit(random);
+      const auto i = static_cast<std::size_t>(kNames * unit(random));
+      const GeodeticPoint point =
+          Direct(places[i], 360 * unit(random), 5000 * unit(random));
+      const double reach_m = std::pow(10, 3 * unit(random));
+      const auto expected = NearByDefinition(view, point, reach_m, AtS(t));
+      ASSERT_EQ(NearNames(view, point, reach_m, AtS(t)), expected)
+          << "round " << round << " t " << t - at_s << " reach " << reach_m;
+      found += expected.size();
+    }
+  }
+  EXPECT_GT(found, 300u);
+}
+
 TEST(DiffContacts, TellsExactlyWhatChanged) {
   std::mt19937_64 random(4);
   ContactMap map(ContactMapOptions{.max_contacts = 400});
