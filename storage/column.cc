@@ -18,6 +18,10 @@ static_assert(std::endian::native == std::endian::little,
 enum PlaneMode : std::uint8_t { kConstant = 0, kRaw = 1, kZstd = 2 };
 
 constexpr int kZstdLevel = 1;
+// Of rows that are written while reports stream in: half of a contact's
+// estimate is noise, on which the level above spends 3.6 times as long (330
+// against 90 ns an estimate) for 4 % less (96 against 99.5 of 242 bytes).
+constexpr int kRowsZstdLevel = -10;
 
 // zstd's contexts take 100 us to make and microseconds to reuse; one a thread.
 struct ContextDeleter {
@@ -225,7 +229,7 @@ void JoinAny(const std::uint8_t* planes, std::size_t count, std::size_t width,
 }
 
 // `scratch` holds ZSTD_compressBound(plane.size()).
-void PutPlane(ByteSpan plane, Scratch& scratch, ByteWriter& writer) {
+void PutPlane(ByteSpan plane, int level, Scratch& scratch, ByteWriter& writer) {
   // memcmp of the plane with itself, shifted by one: all bytes are equal.
   if (std::memcmp(plane.data(), plane.data() + 1, plane.size() - 1) == 0) {
     writer.PutU8(kConstant);
@@ -235,7 +239,7 @@ void PutPlane(ByteSpan plane, Scratch& scratch, ByteWriter& writer) {
   if (plane.size() >= kMinZstdBytes) {
     const std::size_t size =
         ZSTD_compressCCtx(CompressionContext(), scratch.data(), scratch.size(),
-                          plane.data(), plane.size(), kZstdLevel);
+                          plane.data(), plane.size(), level);
     if (ZSTD_isError(size) == 0 && size + 4 < plane.size()) {
       writer.PutU8(kZstd);
       writer.PutVarint(size);
@@ -281,7 +285,8 @@ void PutColumnBytes(const void* elements, std::size_t count, std::size_t width,
            planes.data());
   Scratch scratch(ZSTD_compressBound(count));
   for (std::size_t k = 0; k < width; ++k) {
-    PutPlane(planes.span().subspan(k * count, count), scratch, writer);
+    PutPlane(planes.span().subspan(k * count, count), kZstdLevel, scratch,
+             writer);
   }
 }
 
@@ -301,7 +306,7 @@ void PutRows(ByteSpan rows, std::size_t width, ByteWriter& writer) {
   Scratch planes(rows.size());
   SplitAny(rows.data(), rows.size() / width, width, planes.data());
   Scratch scratch(ZSTD_compressBound(rows.size()));
-  PutPlane(planes.span(), scratch, writer);
+  PutPlane(planes.span(), kRowsZstdLevel, scratch, writer);
 }
 
 Bytes GetRows(ByteReader& reader, std::size_t count, std::size_t width) {

@@ -7,7 +7,7 @@
 //
 //   0 constant  one byte follows: every byte of the plane
 //   1 raw       n bytes follow
-//   2 zstd      varint size, then one zstd frame (level 1) of n bytes
+//   2 zstd      varint size, then one zstd frame of n bytes
 //
 // An empty column is zero bytes long. Planes are coded apart because zstd
 // shares one literal code among all that lies within 128 KiB: a noise plane
@@ -42,7 +42,7 @@ void GetColumnBytes(ByteReader& reader, std::size_t count, std::size_t width,
 
 // Records of `width` bytes each, row after row, in one plane: byte 0 of all
 // rows, then byte 1, and so on. For short tables of wide rows, where a frame
-// for each byte would cost more than it saves.
+// for each byte would cost more than it saves. Compressed in haste.
 void PutRows(ByteSpan rows, std::size_t width, ByteWriter& writer);
 // Empty if the reader is or becomes failed.
 Bytes GetRows(ByteReader& reader, std::size_t count, std::size_t width);
