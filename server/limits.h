@@ -152,11 +152,11 @@ inline constexpr size_t kMaxPendingIngestBytes = 32 * 1024 * 1024;
 inline constexpr size_t kMaxPendingCommands = 64;
 // Messages that the writer applies before it publishes a view.
 inline constexpr size_t kMaxMessagesPerView = 256;
-// Under a stream of messages a view comes at most so often: each copies the
-// blocks that were written since the last (some 60 kB for the swath of one
-// ping), so twenty pings that share one cost a twentieth. A message that comes
-// alone never waits.
-inline constexpr std::chrono::microseconds kViewInterval{1000};
+// Under a stream of messages a view comes at most so often, as often as a group
+// commit: each copies the blocks that were written since the last (some 60 kB
+// for the swath of one ping) and each contact that was heard of, so twenty pings
+// that share one cost a twentieth. A message that comes alone never waits.
+inline constexpr std::chrono::microseconds kViewInterval{2000};
 // How often an idle writer looks whether readers have unpacked tiles of the
 // global map beyond the budget (only if any is packed): two busy processors
 // unpack 20 to 40 MB meanwhile at worst, and a look costs 1 us.
@@ -237,7 +237,7 @@ inline constexpr std::chrono::milliseconds kDrainTime{10'000};
 // k records/s or more, so a start after kill -9 takes 0.3 s more at most.
 inline constexpr size_t kJournalMaxRecords = 20'000;
 // Contact reports that count as one: they take a tenth of a ping's room, and a
-// snapshot of 100 contacts takes as long as 10 000 of their reports.
+// snapshot of 100 contacts takes as long as 4000 of their reports.
 inline constexpr size_t kReportsPerJournalRecord = 2;
 // How long the storage thread waits before it tries again after a fault.
 inline constexpr std::chrono::milliseconds kStorageRetryDelay{250};

@@ -241,8 +241,7 @@ void MapKeeper::DropContact(map::DropContact event, Done<Nothing> done) {
        event = std::move(event)](StorageItem& item) -> absl::StatusOr<Nothing> {
         FATHOM_ASSIGN_OR_RETURN(map::ContactOutcome outcome, map_->Drop(event));
         item.record = storage::JournalRecord{map_->revision(), event};
-        storage::AppendHistoryRows(std::move(outcome), map_->revision(),
-                                   item.contact_history);
+        AddHistory(std::move(outcome), item);
         return Nothing{};
       });
 }
@@ -469,13 +468,18 @@ void MapKeeper::ApplyContact(IngestMessage& message, MessageOutcome& outcome,
   }
   // A refused one may have them too: a late outlier changes what the outlier
   // after it was taken for.
-  storage::AppendHistoryRows(std::move(result), map_->revision(),
-                             item.contact_history);
+  AddHistory(std::move(result), item);
   item.record = storage::JournalRecord{
       map_->revision(),
       storage::ContactRecord{.epoch = message.number.epoch,
                              .sequence = message.number.sequence,
                              .report = std::move(report)}};
+}
+
+void MapKeeper::AddHistory(map::ContactOutcome outcome, StorageItem& item) {
+  const size_t before = history_.size();
+  storage::AppendHistoryRows(std::move(outcome), map_->revision(), history_);
+  item.history_rows = history_.size() - before;
 }
 
 void MapKeeper::KeepTileBudget() {
@@ -560,10 +564,15 @@ void MapKeeper::HandToStorage(std::vector<StorageItem>& items, bool last) {
   MutexLock lock(mutex_);
   if (to_store_.empty()) {
     to_store_.swap(items);
+    history_to_store_.swap(history_);
   } else {
     to_store_.insert(to_store_.end(), std::make_move_iterator(items.begin()),
                      std::make_move_iterator(items.end()));
+    history_to_store_.insert(history_to_store_.end(),
+                             std::make_move_iterator(history_.begin()),
+                             std::make_move_iterator(history_.end()));
     items.clear();
+    history_.clear();
   }
   if (last) mapper_ended_ = true;
   storage_changed_.NotifyOne();

@@ -209,7 +209,9 @@ class MapKeeper {
   struct StorageItem {
     // What the journal, the history and the ledger keep of it.
     std::optional<storage::JournalRecord> record;
-    std::vector<storage::ContactHistoryRow> contact_history;
+    // So many rows of the contact history, next of those handed on beside the
+    // items (one by one they would cost two allocations a report).
+    size_t history_rows = 0;
     std::optional<storage::SourcePosition> position;
     // Set: this view is to be saved whole, and with it how far imports got.
     ViewPtr checkpoint;
@@ -264,6 +266,8 @@ class MapKeeper {
                  StorageItem& item);
   void ApplyContact(IngestMessage& message, MessageOutcome& outcome,
                     StorageItem& item);
+  // Keeps what came of a report or drop for the contact history.
+  void AddHistory(map::ContactOutcome outcome, StorageItem& item);
   // Publishes the map as it is now.
   ViewPtr Publish();
   // The item will save `view`, which is the map as it is now, and all that must
@@ -283,10 +287,12 @@ class MapKeeper {
 
   // The storage thread.
   void RunStorage();
-  bool TakeItems(std::vector<StorageItem>& items);
+  bool TakeItems(std::vector<StorageItem>& items,
+                 std::vector<storage::ContactHistoryRow>& history);
   // Commits the items, again and again while the disk is full. An error: the
   // keeper gave up.
-  absl::Status CommitItems(std::vector<StorageItem>& items);
+  absl::Status CommitItems(std::vector<StorageItem>& items,
+                           std::vector<storage::ContactHistoryRow>& history);
   absl::Status CommitBatch(const storage::Batch& batch,
                            const std::vector<StorageItem>& items);
   void EnterFault(const absl::Status& status,
@@ -300,6 +306,8 @@ class MapKeeper {
   // ---- Mapper thread only (and the constructor). ----
   std::unique_ptr<map::ObstacleMap> map_;
   SourceLedger ledger_;
+  // Rows of what was applied since storage was handed something.
+  std::vector<storage::ContactHistoryRow> history_;
   size_t records_since_checkpoint_ = 0;
   // Contact reports beside them.
   size_t reports_since_checkpoint_ = 0;
@@ -332,6 +340,8 @@ class MapKeeper {
   bool mapper_waits_ FATHOM_GUARDED_BY(mutex_) = false;
   bool mapper_paces_ FATHOM_GUARDED_BY(mutex_) = false;
   std::vector<StorageItem> to_store_ FATHOM_GUARDED_BY(mutex_);
+  std::vector<storage::ContactHistoryRow> history_to_store_
+      FATHOM_GUARDED_BY(mutex_);
   // Listeners that were told Room::kNone.
   std::vector<std::shared_ptr<IngestListener>> waiting_
       FATHOM_GUARDED_BY(mutex_);

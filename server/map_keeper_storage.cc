@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <iterator>
 #include <type_traits>
+#include <utility>
+#include <vector>
 
 #include "absl/strings/str_format.h"
 #include "base/log.h"
@@ -15,9 +17,21 @@ namespace {
 // How long the storage thread is idle before it does housekeeping.
 constexpr std::chrono::milliseconds kIdleTime{1000};
 
+// Takes the first `count` off. REQUIRES: count <= rows.size().
+std::vector<storage::ContactHistoryRow> TakeFirst(
+    size_t count, std::vector<storage::ContactHistoryRow>& rows) {
+  if (count == rows.size()) return std::exchange(rows, {});
+  const auto end = rows.begin() + static_cast<std::ptrdiff_t>(count);
+  std::vector<storage::ContactHistoryRow> first(
+      std::make_move_iterator(rows.begin()), std::make_move_iterator(end));
+  rows.erase(rows.begin(), end);
+  return first;
+}
+
 }  // namespace
 
-bool MapKeeper::TakeItems(std::vector<StorageItem>& items) {
+bool MapKeeper::TakeItems(std::vector<StorageItem>& items,
+                          std::vector<storage::ContactHistoryRow>& history) {
   bool idle_told = false;
   while (true) {
     bool idle = false;
@@ -39,6 +53,7 @@ bool MapKeeper::TakeItems(std::vector<StorageItem>& items) {
           }
         }
         items.swap(to_store_);
+        history.swap(history_to_store_);
         commit_paced_from_ =
             items.size() > 1 ? std::chrono::steady_clock::now() : SteadyTime{};
         return true;
@@ -52,32 +67,35 @@ bool MapKeeper::TakeItems(std::vector<StorageItem>& items) {
 
 void MapKeeper::RunStorage() {
   std::vector<StorageItem> items;
+  std::vector<storage::ContactHistoryRow> history;
   absl::Status status;
-  while (TakeItems(items)) {
-    if (status.ok()) status = CommitItems(items);
+  while (TakeItems(items, history)) {
+    if (status.ok()) status = CommitItems(items, history);
     if (status.ok()) {
       TellDurable(items);
     } else {
       GiveUp(status, items);
     }
     items.clear();
+    history.clear();
   }
 }
 
-absl::Status MapKeeper::CommitItems(std::vector<StorageItem>& items) {
+absl::Status MapKeeper::CommitItems(
+    std::vector<StorageItem>& items,
+    std::vector<storage::ContactHistoryRow>& history) {
   size_t begin = 0;
   while (begin < items.size()) {
     // Up to and with the next checkpoint, which covers what is before it.
     storage::Batch batch;
     batch.journal.reserve(items.size() - begin);
-    batch.contact_history.reserve(items.size() - begin);
     ViewPtr checkpoint;
     size_t records = 0;
+    size_t rows = 0;
     size_t end = begin;
     for (; end < items.size() && checkpoint == nullptr; ++end) {
       StorageItem& item = items[end];
-      std::move(item.contact_history.begin(), item.contact_history.end(),
-                std::back_inserter(batch.contact_history));
+      rows += item.history_rows;
       if (item.record.has_value()) {
         batch.journal.push_back(*std::move(item.record));
         records += 1;
@@ -90,6 +108,7 @@ absl::Status MapKeeper::CommitItems(std::vector<StorageItem>& items) {
       }
       checkpoint = item.checkpoint;
     }
+    batch.contact_history = TakeFirst(rows, history);
     if (checkpoint != nullptr) {
       batch.checkpoint =
           storage::Checkpoint{.now = checkpoint, .previous = saved_view_};
