@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
 #include <set>
 #include <string>
@@ -187,7 +188,7 @@ TEST(ContactsView, IndexMissesNothingAtAnyTime) {
 TEST(ContactsView, IndexMissesNothingAfterAnyNumberOfReports) {
   std::mt19937_64 random(31);
   std::uniform_real_distribution<double> unit(0, 1);
-  constexpr int kNames = 60;
+  constexpr int kNames = 200;
   ContactMap map(ContactMapOptions{.max_contacts = 25});
   std::vector<GeodeticPoint> places(kNames);
   for (GeodeticPoint& place : places) {
@@ -198,33 +199,43 @@ TEST(ContactsView, IndexMissesNothingAfterAnyNumberOfReports) {
   for (int round = 0; round < 150; ++round) {
     // Bursts of one contact, or a few reports of many.
     const int bursts = 1 + static_cast<int>(6 * unit(random));
+    std::vector<std::size_t> touched;
     for (int burst = 0; burst < bursts; ++burst) {
       const auto i = static_cast<std::size_t>(kNames * unit(random));
       const std::string name = std::to_string(i);
-      const int reports = static_cast<int>(600 * std::pow(unit(random), 4)) + 1;
+      touched.push_back(i);
+      const double most = unit(random) < 0.05 ? 600 : 100;
+      const int reports = static_cast<int>(most * unit(random)) + 1;
+      // Out and back again, at 20 m/s or so.
       const double course_deg = 360 * unit(random);
       for (int report = 0; report < reports; ++report) {
-        at_s += 0.5 * unit(random);
-        places[i] = Direct(places[i], course_deg, 5);
-        const double late_s = unit(random) < 0.02 ? 40 * unit(random) : 0;
-        ContactReport next = unit(random) < 0.3
-                                 ? Fix(name, at_s - late_s, places[i], 8, -3)
-                                 : Heard(name, at_s - late_s, places[i], 50, 0);
-        next.inactive = unit(random) < 0.005;
+        const double step_s = 5 * unit(random);
+        at_s += step_s;
+        const double now_deg = course_deg + (2 * report > reports ? 180 : 0);
+        places[i] = Direct(places[i], now_deg, 20 * step_s);
+        const double late_s = unit(random) < 0.003 ? 40 * unit(random) : 0;
+        const double course_rad = now_deg * std::numbers::pi / 180;
+        ContactReport next =
+            unit(random) < 0.3
+                ? Fix(name, at_s - late_s, places[i], 20 * std::cos(course_rad),
+                      20 * std::sin(course_rad))
+                : Heard(name, at_s - late_s, places[i], 50, 0);
+        next.inactive = unit(random) < 0.002;
         map.Apply(next);
       }
       // All that are alive are stale: then they make room and are forgotten.
-      if (unit(random) < 0.05) at_s += 100'000;
+      if (unit(random) < 0.05) at_s += 5000;
     }
     const ContactsView view = map.View();
-    for (int question = 0; question < 4; ++question) {
-      const double t = unit(random) < 0.7
-                           ? at_s - 2000 * std::pow(unit(random), 3)
-                           : at_s + 2000 * unit(random);
-      const auto i = static_cast<std::size_t>(kNames * unit(random));
+    for (std::size_t question = 0; question < 6; ++question) {
+      const double t = unit(random) < 0.7 ? at_s - 2000 * unit(random)
+                                          : at_s + 2000 * unit(random);
+      const auto i = touched[question % touched.size()];
+      const auto there = view.At(Key(std::to_string(i)), AtS(t));
       const GeodeticPoint point =
-          Direct(places[i], 360 * unit(random), 5000 * unit(random));
-      const double reach_m = std::pow(10, 3 * unit(random));
+          Direct(there.has_value() ? there->Position() : places[i],
+                 360 * unit(random), 300 * unit(random));
+      const double reach_m = std::pow(10, 2 * unit(random));
       const auto expected = NearByDefinition(view, point, reach_m, AtS(t));
       ASSERT_EQ(NearNames(view, point, reach_m, AtS(t)), expected)
           << "round " << round << " t " << t - at_s << " reach " << reach_m;
