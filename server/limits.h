@@ -154,8 +154,9 @@ inline constexpr size_t kMaxPendingCommands = 64;
 inline constexpr size_t kMaxMessagesPerView = 256;
 // Under a stream of messages a view comes at most so often, as often as a group
 // commit: each copies the blocks that were written since the last (some 60 kB
-// for the swath of one ping) and each contact that was heard of, so twenty pings
-// that share one cost a twentieth. A message that comes alone never waits.
+// for the swath of one ping) and each contact that was heard of, so twenty
+// pings that share one cost a twentieth. A message that comes alone never
+// waits.
 inline constexpr std::chrono::microseconds kViewInterval{2000};
 // How often an idle writer looks whether readers have unpacked tiles of the
 // global map beyond the budget (only if any is packed): two busy processors

@@ -8,7 +8,7 @@
 //   3  the mission file could not be written while serving (an I/O error, or
 //      the disk was still full at the end, or a damaged page in the way): what
 //      was acknowledged is in it, what was not must be sent again. A supervisor
-//      should start it again.
+//      should start it again (with a damaged page: once it is repaired).
 
 #include <pthread.h>
 #include <signal.h>
@@ -135,7 +135,7 @@ void AddFlags(CLI::App& app, Flags& flags) {
   app.add_option(
          "--history-max-mb", flags.history_max_mb,
          "Most megabytes of it, what GDAL shows of it included (1 MB: about "
-         "10 000 estimates); the oldest go first")
+         "8000 estimates); the oldest go first")
       ->check(CLI::Range(std::uint64_t{1}, kMaxHistoryMb))
       ->group(kHistory)
       ->type_name("MB");

@@ -34,6 +34,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <thread>
 #include <utility>
@@ -289,15 +290,16 @@ class MapKeeper {
   void RunStorage();
   bool TakeItems(std::vector<StorageItem>& items,
                  std::vector<storage::ContactHistoryRow>& history);
-  // Commits the items, again and again while the disk is full. An error: the
-  // keeper gave up.
+  // Commits the items, again and again while the disk is full, and tells who
+  // waits for them, part by part. An error: the keeper gave up; what is left of
+  // the items is not durable.
   absl::Status CommitItems(std::vector<StorageItem>& items,
                            std::vector<storage::ContactHistoryRow>& history);
   absl::Status CommitBatch(const storage::Batch& batch,
                            const std::vector<StorageItem>& items);
   void EnterFault(const absl::Status& status,
                   const std::vector<StorageItem>& items);
-  void TellDurable(std::vector<StorageItem>& items);
+  void TellDurable(std::span<StorageItem> items);
   void GiveUp(const absl::Status& status, std::vector<StorageItem>& items);
 
   const KeeperOptions options_;

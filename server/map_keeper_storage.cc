@@ -2,6 +2,7 @@
 // waits that it is durable, and handles a disk that refuses.
 #include <algorithm>
 #include <iterator>
+#include <span>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -71,11 +72,7 @@ void MapKeeper::RunStorage() {
   absl::Status status;
   while (TakeItems(items, history)) {
     if (status.ok()) status = CommitItems(items, history);
-    if (status.ok()) {
-      TellDurable(items);
-    } else {
-      GiveUp(status, items);
-    }
+    if (!status.ok()) GiveUp(status, items);
     items.clear();
     history.clear();
   }
@@ -113,7 +110,11 @@ absl::Status MapKeeper::CommitItems(
       batch.checkpoint =
           storage::Checkpoint{.now = checkpoint, .previous = saved_view_};
     }
-    FATHOM_RETURN_IF_ERROR(CommitBatch(batch, items));
+    if (absl::Status status = CommitBatch(batch, items); !status.ok()) {
+      items.erase(items.begin(),
+                  items.begin() + static_cast<std::ptrdiff_t>(begin));
+      return status;
+    }
     if (checkpoint != nullptr) saved_view_ = checkpoint->AtRest();
     {
       MutexLock lock(mutex_);
@@ -121,6 +122,7 @@ absl::Status MapKeeper::CommitItems(
       storage_.journal_records =
           batch.checkpoint.has_value() ? 0 : storage_.journal_records + records;
     }
+    TellDurable(std::span(items).subspan(begin, end - begin));
     begin = end;
   }
   return absl::OkStatus();
@@ -132,11 +134,14 @@ absl::Status MapKeeper::CommitBatch(const storage::Batch& batch,
     absl::Status status = store_.Commit(batch);
     if (!absl::IsResourceExhausted(status)) {
       if (status.ok()) {
-        MutexLock lock(mutex_);
-        if (!storage_.fault.empty()) {
-          Log(LogLevel::kInfo, "the mission file can be written again");
+        bool again = false;
+        {
+          MutexLock lock(mutex_);
+          again = !storage_.fault.empty();
+          storage_.fault.clear();
         }
-        storage_.fault.clear();
+        if (again)
+          Log(LogLevel::kInfo, "the mission file can be written again");
       } else {
         EnterFault(status, items);
       }
@@ -153,17 +158,23 @@ absl::Status MapKeeper::CommitBatch(const storage::Batch& batch,
 void MapKeeper::EnterFault(const absl::Status& status,
                            const std::vector<StorageItem>& items) {
   std::vector<std::shared_ptr<IngestListener>> listeners;
+  bool first = false;
+  bool told = false;
   {
     MutexLock lock(mutex_);
-    const bool first = storage_.fault.empty();
+    first = storage_.fault.empty();
+    // A full disk may have room again and then show damage.
+    told = !first && storage_.damaged == absl::IsDataLoss(status);
     storage_.damaged = absl::IsDataLoss(status);
     storage_.fault = std::string(status.message());
     if (storage_.fault.empty()) storage_.fault = status.ToString();
-    if (!first) return;
-    listeners.swap(waiting_);
+    if (first) listeners.swap(waiting_);
   }
-  Log(LogLevel::kError, "nothing new is taken, queries go on: %s",
-      std::string(status.message()));
+  if (!told) {
+    Log(LogLevel::kError, "nothing new is taken, queries go on: %s",
+        std::string(status.message()));
+  }
+  if (!first) return;
   for (const StorageItem& item : items) {
     if (item.listener != nullptr) listeners.push_back(item.listener);
   }
@@ -173,7 +184,7 @@ void MapKeeper::EnterFault(const absl::Status& status,
   for (const auto& listener : listeners) listener->OnFault();
 }
 
-void MapKeeper::TellDurable(std::vector<StorageItem>& items) {
+void MapKeeper::TellDurable(std::span<StorageItem> items) {
   size_t messages = 0;
   size_t bytes = 0;
   size_t commands = 0;

@@ -114,8 +114,10 @@ absl::StatusOr<HistoryTable> HistoryTable::Create(Connection& connection) {
               "content_bytes = ?, forgotten_count = ?"));
   FATHOM_RETURN_IF_ERROR(
       prepare(table.read_total_,
-              "SELECT estimate_count, content_bytes, forgotten_count, (SELECT "
-              "count(*) FROM contact_history) FROM contact_history_total"));
+              "SELECT estimate_count, content_bytes, forgotten_count FROM "
+              "contact_history_total"));
+  FATHOM_RETURN_IF_ERROR(
+      prepare(table.count_blocks_, "SELECT count(*) FROM contact_history"));
   return table;
 }
 
@@ -123,13 +125,21 @@ absl::Status HistoryTable::ReloadTotal() {
   FATHOM_ASSIGN_OR_RETURN(const bool row, read_total_.Step());
   if (row) {
     total_ = {.estimates = read_total_.ColumnUint(0),
-              .blocks = read_total_.ColumnUint(3),
               .content_bytes = read_total_.ColumnUint(1),
               .forgotten_estimates = read_total_.ColumnUint(2)};
   }
   read_total_.Reset();
-  if (row) return absl::OkStatus();
-  return absl::DataLossError("the table contact_history_total is empty");
+  if (!row) {
+    return absl::DataLossError("the table contact_history_total is empty");
+  }
+  const absl::StatusOr<bool> counted = count_blocks_.Step();
+  if (counted.ok() && *counted) total_.blocks = count_blocks_.ColumnUint(0);
+  count_blocks_.Reset();
+  if (!absl::IsDataLoss(counted.status())) return counted.status();
+  // What a damaged index is needed for tells of it; for the limits full blocks
+  // will do.
+  total_.blocks = (total_.estimates + kBlockEstimates - 1) / kBlockEstimates;
+  return absl::OkStatus();
 }
 
 absl::Status HistoryTable::WriteTotal() {

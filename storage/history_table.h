@@ -86,7 +86,8 @@ class HistoryTable {
 
   const HistoryTotal& total() const { return total_; }
   // As it stands in the file. Counts the blocks, in the smallest index: 5 ms
-  // for those of 100 M estimates, in memory.
+  // for those of 100 M estimates, in memory. Where that index is damaged: as
+  // many as full ones would be.
   absl::Status ReloadTotal();
   // As it was before a transaction that was rolled back.
   void RestoreTotal(const HistoryTotal& total) { total_ = total; }
@@ -126,6 +127,7 @@ class HistoryTable {
   Statement place_;
   Statement write_total_;
   Statement read_total_;
+  Statement count_blocks_;
 };
 
 // Some of a contact's blocks, in order.

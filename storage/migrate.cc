@@ -149,8 +149,7 @@ absl::Status Migrate(const std::string& path, Connection& connection,
   const std::uintmax_t bytes = std::filesystem::file_size(path, error);
   teller.Tell(absl::StrFormat(
       "%s is of format %d and is brought to %d, %d MB; as it is it stays "
-      "beside "
-      "it as .v%d.bak",
+      "beside it as .v%d.bak",
       path, version, kSchemaVersion, error ? 0 : bytes / 1'000'000, version));
   FATHOM_RETURN_IF_ERROR(BackUp(path, version, connection));
   if (version < 6) FATHOM_RETURN_IF_ERROR(ToVersion6(connection));

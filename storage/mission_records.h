@@ -139,7 +139,7 @@ struct HistoryLimits {
   // Beside the newest estimate in blocks.
   std::optional<Duration> max_age;
   // Of what is kept in blocks and shown to GDAL (HistoryTotal::bytes): about
-  // 100 bytes an estimate.
+  // 120 bytes an estimate.
   std::optional<std::uint64_t> max_bytes;
 };
 

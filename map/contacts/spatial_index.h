@@ -84,7 +84,7 @@ struct SpatialEntry {
 // The entry for a contact. `before`: its entry when the newest `appended`
 // estimates had not come, if it had one and nothing else was done to its
 // estimates since. What is said of the newest then follows from `before` in
-// O(appended), a little wider, but once in 32 reports; what is said of the
+// O(appended), a little wider, but once in 128 reports; what is said of the
 // older, but once in 512. Else O(estimates kept).
 SpatialEntry MakeSpatialEntry(const Contact& contact,
                               const ContactClassTable& classes,

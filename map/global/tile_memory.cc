@@ -15,8 +15,8 @@ constexpr std::uint64_t kControlBytes = 16;
 // budget, no more is evicted.
 constexpr std::uint64_t kLeastRetiredBytes = 16 << 20;
 
-// Slots that the clock's hand passes before the mutex is let go: readers wait
-// for some microseconds, however many slots there are.
+// Slots that the clock's hand passes before the mutex is let go: it is held
+// for some microseconds at a time, however many slots there are.
 constexpr std::uint64_t kLooksPerLock = 64;
 
 std::uint64_t BytesOf(const PackedTile& packed) {

@@ -180,7 +180,8 @@ class Hostile(LiveTest):
             until = time.monotonic() + DEADLINE_S
             while time.monotonic() < until:
                 try:
-                    channel.unary_unary(QUERY)(giant, timeout=DEADLINE_S)
+                    channel.unary_unary(QUERY)(giant, timeout=DEADLINE_S,
+                                               wait_for_ready=True)
                     return
                 except grpc.RpcError as error:
                     reasons.append(error.details())

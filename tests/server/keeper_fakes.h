@@ -33,7 +33,7 @@ class FakeStore final : public MissionStore {
     attempts_ += 1;
     changed_.NotifyAll();
     while (held_) changed_.Wait(mutex_);
-    if (!failure_.ok()) return failure_;
+    if (!failure_.ok() && seen_.size() >= fail_from_) return failure_;
     seen_.push_back({.journal = batch.journal.size(),
                      .positions = batch.source_positions.size(),
                      .history = batch.contact_history.size(),
@@ -51,10 +51,12 @@ class FakeStore final : public MissionStore {
     held_ = false;
     changed_.NotifyAll();
   }
-  // Every commit fails so until Fail(OkStatus()).
-  void Fail(absl::Status status) {
+  // Every commit fails so, once there were `from` good ones, until
+  // Fail(OkStatus()).
+  void Fail(absl::Status status, size_t from = 0) {
     MutexLock lock(mutex_);
     failure_ = std::move(status);
+    fail_from_ = from;
   }
   // Waits until Commit was called `count` times in all.
   void AwaitAttempts(size_t count) {
@@ -72,6 +74,7 @@ class FakeStore final : public MissionStore {
   bool held_ FATHOM_GUARDED_BY(mutex_) = false;
   size_t attempts_ FATHOM_GUARDED_BY(mutex_) = 0;
   absl::Status failure_ FATHOM_GUARDED_BY(mutex_);
+  size_t fail_from_ FATHOM_GUARDED_BY(mutex_) = 0;
   std::vector<SeenBatch> seen_ FATHOM_GUARDED_BY(mutex_);
 };
 

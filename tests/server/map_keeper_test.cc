@@ -375,6 +375,35 @@ TEST_F(FatalTest, DamageInTheWayOfAWriteRefusesIngestAndKeepsQueries) {
   EXPECT_THAT(fatal_, ::testing::IsEmpty());
 }
 
+TEST_F(FatalTest, DamageInTheWayOfAWriteEndsStreams) {
+  Submit(PingMessage(1));
+  listener_->AwaitDurable(1);
+  store_.Fail(absl::DataLossError("page 7; repair it"));
+  Submit(PingMessage(2));
+  listener_->AwaitFaults(1);
+  EXPECT_EQ(listener_->durable(), 1U);
+  EXPECT_THAT(keeper_->Stop(), StatusIs(absl::StatusCode::kDataLoss));
+}
+
+// A checkpoint and what came after it, handed to storage together: the first
+// part is on the disk. Its command used to be told the damage of the second.
+TEST_F(FatalTest, WhatWasCommittedBeforeTheDamageIsToldDurable) {
+  store_.Hold();
+  Submit(PingMessage(1));
+  store_.AwaitAttempts(1);
+  Awaited<map::TransferResult> transferred;
+  keeper_->Transfer(kLeg, transferred.Done());
+  Submit(PingMessage(2));
+  listener_->AwaitApplied(2);
+  store_.Fail(absl::DataLossError("page 7; repair it"), 2);
+  store_.Release();
+  EXPECT_THAT(transferred.Await(), IsOk());
+  listener_->AwaitFaults(1);
+  EXPECT_EQ(listener_->durable(), 1U);
+  EXPECT_TRUE(keeper_->storage_state().damaged);
+  EXPECT_THAT(keeper_->Stop(), StatusIs(absl::StatusCode::kDataLoss));
+}
+
 class BoundedTest : public MapKeeperTest {
  protected:
   BoundedTest() : MapKeeperTest(Small()) {}
@@ -387,6 +416,18 @@ class BoundedTest : public MapKeeperTest {
     return options;
   }
 };
+
+// There is room again, and then a page is damaged.
+TEST_F(BoundedTest, AFullDiskMayTurnOutToBeDamaged) {
+  store_.Fail(absl::ResourceExhaustedError("no space left"));
+  Submit(PingMessage(1));
+  listener_->AwaitFaults(1);
+  EXPECT_FALSE(keeper_->storage_state().damaged);
+  store_.Fail(absl::DataLossError("page 7; repair it"));
+  while (!keeper_->storage_state().damaged) std::this_thread::yield();
+  EXPECT_EQ(keeper_->storage_state().fault, "page 7; repair it");
+  EXPECT_THAT(keeper_->Stop(), StatusIs(absl::StatusCode::kDataLoss));
+}
 
 TEST_F(BoundedTest, SaysWhenThereIsNoMoreRoomAndWhenThereIsAgain) {
   store_.Hold();

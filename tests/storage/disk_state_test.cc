@@ -15,6 +15,7 @@
 #include <string>
 
 #include "storage/checked_pages.h"
+#include "storage/history_codec.h"
 #include "storage/mission_file.h"
 #include "storage/offline.h"
 #include "storage/restore.h"
@@ -142,10 +143,9 @@ TEST(ReadOnlyMission, IsRefusedWithTheReasonAndUntouched) {
   EXPECT_EQ(ReadAll(path), before);
 }
 
-// A tile's page is damaged, and the next checkpoint is to write the tile.
-TEST(DamagedPage, IsNeverWrittenOverUnseen) {
-  const TempDir dir;
-  const std::string path = dir.File("m");
+// A mission of 110 events, in which a bit of the first page of the table or
+// index `name` is turned.
+void MakeDamagedMission(const std::string& path, const std::string& name) {
   map::ObstacleMap map(*OptionsOf(SampleMetadata()));
   EventScript script(map, nullptr);
   std::int64_t page = 0;
@@ -164,12 +164,44 @@ TEST(DamagedPage, IsNeverWrittenOverUnseen) {
         Connection connection,
         Connection::Open(path, Connection::Mode::kReadOnly));
     FATHOM_ASSERT_OK_AND_ASSIGN(
-        page, connection.QueryInt(
-                  "SELECT rootpage FROM sqlite_schema WHERE name = 'tile'"));
+        page,
+        connection.QueryInt(
+            "SELECT rootpage FROM sqlite_schema WHERE name = '" + name + "'"));
   }
   std::string content = ReadAll(path);
   content[static_cast<std::size_t>(page - 1) * 8192 + 4000] ^= 1;
   std::ofstream(path, std::ios::binary) << content;
+}
+
+// The index by age serves retention and the reckoning of its limit, no reader.
+TEST(DamagedPage, OfTheHistorysIndexLeavesTheMissionWhole) {
+  const TempDir dir;
+  const std::string path = dir.File("m");
+  MakeDamagedMission(path, "contact_history_age");
+  FATHOM_ASSERT_OK_AND_ASSIGN(auto file, MissionFile::Open(path));
+  FATHOM_ASSERT_OK_AND_ASSIGN(const Loaded loaded, file->Load());
+  EXPECT_TRUE(loaded.damage.empty());
+  const HistoryTotal total = file->Status().history;
+  EXPECT_GT(total.estimates, 0u);
+  EXPECT_EQ(total.blocks,
+            (total.estimates + kBlockEstimates - 1) / kBlockEstimates);
+  std::size_t read = 0;
+  for (const map::StoredContact& contact : loaded.contacts) {
+    ASSERT_THAT(file->ReadContactHistory(contact.key, Time::min(), Time::max(),
+                                         [&read](const ContactHistoryRow&) {
+                                           ++read;
+                                           return true;
+                                         }),
+                IsOk());
+  }
+  EXPECT_GT(read, 0u);
+}
+
+// A tile's page is damaged, and the next checkpoint is to write the tile.
+TEST(DamagedPage, IsNeverWrittenOverUnseen) {
+  const TempDir dir;
+  const std::string path = dir.File("m");
+  MakeDamagedMission(path, "tile");
 
   FATHOM_ASSERT_OK_AND_ASSIGN(auto file, MissionFile::Open(path));
   FATHOM_ASSERT_OK_AND_ASSIGN(Loaded loaded, file->Load());
