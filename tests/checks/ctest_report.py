@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Reads ctest's JUnit report for tests/run.
 
-Prints "PASSED FAILED" (counts of ctest entries), then one line for each failed
-entry, "failed NAME", then the reason of every GTEST_SKIP, "skipped TIMES
-REASON": a binary that skipped a case has passed for ctest. An entry that ctest
-did not run counts as failed.
+Prints "PASSED FAILED" (counts of ctest entries), then for each failed entry
+"failed NAME" and the end of what it printed, "printed LINE", then the reason of
+every GTEST_SKIP, "skipped TIMES REASON": a binary that skipped a case has passed
+for ctest. An entry that ctest did not run counts as failed.
 
 Usage: ctest_report.py REPORT.xml
 """
@@ -14,6 +14,7 @@ import re
 import sys
 import xml.etree.ElementTree
 
+SHOWN_LINES = 30
 SKIP = re.compile(r"^.*: Skipped\n(.*)$", re.M)
 
 
@@ -26,12 +27,15 @@ def main():
         if case.get("status") == "run":
             passed += 1
         else:
-            failed.append(case.get("name"))
+            failed.append(case)
         output = case.findtext("system-out") or ""
         skips.update(match.group(1).strip() for match in SKIP.finditer(output))
     print(passed, len(failed))
-    for name in failed:
-        print("failed", name)
+    for case in failed:
+        print("failed", case.get("name"))
+        lines = (case.findtext("system-out") or "").splitlines()
+        for line in lines[-SHOWN_LINES:]:
+            print("printed", line)
     for reason, times in skips.most_common():
         print("skipped", times, reason)
 
