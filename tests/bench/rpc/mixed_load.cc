@@ -51,6 +51,7 @@ using Seconds = std::chrono::duration<double>;
 struct Lengths {
   double idle_s = 2;
   double loaded_s = 5;
+  double null_loaded_s = 5;
 };
 
 // Latencies of questions for `seconds`, microseconds.
@@ -250,7 +251,7 @@ absl::Status AskNull(const client::Client& null,
                           AskFor(null, lengths.idle_s));
   const auto start = SteadyClock::now();
   PingLoad pings(channel, rate, epoch);
-  auto loaded = AskFor(null, lengths.loaded_s);
+  auto loaded = AskFor(null, lengths.null_loaded_s);
   pings.Stop();
   const double lasted_s = SecondsSince(start);
   FATHOM_RETURN_IF_ERROR(loaded.status());
@@ -332,7 +333,11 @@ int Main(int argc, char** argv) {
                  "Before the load in each window")
       ->capture_default_str();
   app.add_option("--windows", windows, "How many")->capture_default_str();
+  const auto* null_seconds =
+      app.add_option("--null-seconds", lengths.null_loaded_s,
+                     "Of load on the null server (default: --seconds)");
   CLI11_PARSE(app, argc, argv);
+  if (null_seconds->empty()) lengths.null_loaded_s = lengths.loaded_s;
   return ExitCode("mixed_load", Run(server, null, rate, lengths, windows));
 }
 
