@@ -5,6 +5,7 @@ stands before the C library."""
 import hashlib
 import json
 import os
+import queue
 import sqlite3
 import subprocess
 import threading
@@ -332,6 +333,14 @@ class CopiesAndProofs(LiveTest):
         report_contacts(server, [fix_report(i, 5 * i, second=i)
                                  for i in range(21, 26)])
         digest = server.status(digest=True).map_digest
+        # A stream that stays open: what it sent is durable, more is to come.
+        sending = queue.SimpleQueue()
+        self.addCleanup(sending.put, None)
+        sending.put(ingest.StreamPingsRequest(
+            ping=ping(1, [(105, 105, 20.0, 3.0)])))
+        held = server.ingest.StreamPings(iter(sending.get, None),
+                                         timeout=DEADLINE_S)
+        self.assertEqual(next(held).durable_sequence, 1)
         # A snapshot adds what is new to the contact's last block.
         lost = grpc.StatusCode.DATA_LOSS
         error = self.assert_status(
@@ -342,6 +351,13 @@ class CopiesAndProofs(LiveTest):
                          "STORAGE_DAMAGED")
         self.assertNotIn("RetryInfo", details_of(error))
         self.assertIn("checksum", server.status().storage.fault)
+        sending.put(ingest.StreamPingsRequest(
+            ping=ping(2, [(105, 105, 20.0, 3.0)])))
+        with self.assertRaises(grpc.RpcError) as ended:
+            list(held)
+        self.assertEqual(ended.exception.code(), lost)
+        self.assertEqual(details_of(ended.exception)["ErrorInfo"].reason,
+                         "STORAGE_DAMAGED")
         self.assert_status(lost, server.ingest.ReportContacts,
                            ingest.ReportContactsRequest(
                                reports=[fix_report(26, 130, second=26)]))
