@@ -148,8 +148,8 @@ void AddImport(CLI::App& mission, Session& session) {
     session.run = [&session, arguments, ageing, create, as_chart]() {
       std::vector<std::string> all = {"import"};
       all.insert(all.end(), arguments->begin(), arguments->end());
-      if (*create) all.push_back("--create");
-      if (*as_chart) all.push_back("--as-chart");
+      if (*create) all.emplace_back("--create");
+      if (*as_chart) all.emplace_back("--as-chart");
       if (!ageing->empty()) {
         all.insert(all.end(), {"--ageing-m2-per-day", *ageing});
       }

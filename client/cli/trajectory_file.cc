@@ -204,7 +204,7 @@ absl::StatusOr<std::vector<QuestionPoint>> ReadTrajectory(
     return BadFile(
         absl::StrFormat("%s: %s", path, std::string(text.status().message())));
   }
-  const absl::StatusOr<std::vector<QuestionPoint>> points =
+  absl::StatusOr<std::vector<QuestionPoint>> points =
       ParseTrajectory(*text, defaults);
   if (!points.ok()) {
     return BadFile(absl::StrFormat("%s: %s", path,

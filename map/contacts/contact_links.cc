@@ -15,10 +15,8 @@
 
 namespace fathom::map {
 
-ContactOutcome ContactMap::ApplyLinked(const ContactKey& named,
+ContactOutcome ContactMap::ApplyLinked(ContactKey contact,
                                        const ContactReport& report) {
-  // A copy: `named` may stand in the link that the report ends.
-  const ContactKey contact = named;
   if (report.inactive) {
     // This source has lost it; the track goes on with the others.
     ContactOutcome outcome;
@@ -28,9 +26,9 @@ ContactOutcome ContactMap::ApplyLinked(const ContactKey& named,
     return outcome;
   }
   ContactReport theirs = report;
-  theirs.key = contact;
   // What C4I says of the class is the truth.
   theirs.contact_class = set_->Get(contact)->newest().contact_class;
+  theirs.key = std::move(contact);
   return ApplyOwn(theirs, 0);
 }
 

@@ -134,9 +134,9 @@ class ContactMap {
   ContactOutcome ApplyFirst(const ContactReport& report, std::size_t room);
   ContactOutcome ApplyNext(const Contact& held, const ContactReport& report);
   ContactOutcome ApplyLate(const Contact& held, const ContactReport& report);
-  // A report about another name of `contact`.
-  ContactOutcome ApplyLinked(const ContactKey& contact,
-                             const ContactReport& report);
+  // A report about another name of `contact`, which is a copy: the link that
+  // the report may end holds the one it was found by.
+  ContactOutcome ApplyLinked(ContactKey contact, const ContactReport& report);
   // A report with same_as.
   ContactOutcome ApplyLinking(const ContactReport& report);
   // The names that the report makes other names of its contact, in order.
