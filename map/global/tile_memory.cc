@@ -178,7 +178,7 @@ TileSlot::TileSlot(std::shared_ptr<TileMemory> memory,
       key_(tile->key()),
       totals_(tile->totals()),
       memory_(std::move(memory)) {
-  (void)tile.release();  // live_ holds it
+  (void)tile.release();  // live_ holds it.
   memory_->Enter(*this);
 }
 

@@ -333,7 +333,8 @@ class CopiesAndProofs(LiveTest):
         report_contacts(server, [fix_report(i, 5 * i, second=i)
                                  for i in range(21, 26)])
         digest = server.status(digest=True).map_digest
-        # A stream that stays open: what it sent is durable, more is to come.
+        # A stream that stays open: what it sends was durable before (the digest
+        # stays as it is), more is to come.
         sending = queue.SimpleQueue()
         self.addCleanup(sending.put, None)
         sending.put(ingest.StreamPingsRequest(
