@@ -40,10 +40,12 @@ def judge(rows, window_s, server_exit_code):
     if rows[-1]["files"] > rows[0]["files"] + 2:
         wrong.append("open files grow")
     # Twice and a millisecond: what flat cannot mean on a machine that does
-    # other work too. Other work that came on meanwhile slowed the null server
-    # as well, which keeps nothing that could grow: that much is not ours.
-    beyond_us = query_us[1] - (2 * query_us[0] + 1000)
-    if beyond_us > max(0, null_us[1] - null_us[0]):
+    # other work too. Other work that came on meanwhile made the null server
+    # slower as well, which keeps nothing that could grow: that factor is not
+    # ours (three busy loops: ours 0.8 to 5.9 ms, the null server's 0.6 to 3.5).
+    allowed_us = 2 * query_us[0] + 1000
+    by_machine = max(1, null_us[1] / null_us[0])
+    if query_us[1] > allowed_us * by_machine:
         wrong.append("query p99 grows")
     if server_exit_code != 0:
         wrong.append("the server's exit code")
@@ -56,7 +58,8 @@ def judge(rows, window_s, server_exit_code):
         "files": [rows[0]["files"], rows[-1]["files"]],
         "query_p99_us": query_us,
         "null_query_p99_us": null_us,
-        "p99_excused_by_null": beyond_us > 0 and "query p99 grows" not in wrong,
+        "p99_excused_by_null":
+            allowed_us < query_us[1] <= allowed_us * by_machine,
         "ack_p99_ms": round(statistics.median(row["ack_p99_ms"]
                                               for row in rows), 1),
         "server_exit_code": server_exit_code,
