@@ -51,7 +51,7 @@ using Seconds = std::chrono::duration<double>;
 struct Lengths {
   double idle_s = 2;
   double loaded_s = 5;
-  double null_loaded_s = 5;
+  double null_loaded_s = 0;  // 0: as loaded_s.
 };
 
 // Latencies of questions for `seconds`, microseconds.
@@ -333,11 +333,11 @@ int Main(int argc, char** argv) {
                  "Before the load in each window")
       ->capture_default_str();
   app.add_option("--windows", windows, "How many")->capture_default_str();
-  const auto* null_seconds =
-      app.add_option("--null-seconds", lengths.null_loaded_s,
-                     "Of load on the null server (default: --seconds)");
+  app.add_option("--null-seconds", lengths.null_loaded_s,
+                 "Of load on the null server (0: as --seconds)")
+      ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
-  if (null_seconds->empty()) lengths.null_loaded_s = lengths.loaded_s;
+  if (lengths.null_loaded_s == 0) lengths.null_loaded_s = lengths.loaded_s;
   return ExitCode("mixed_load", Run(server, null, rate, lengths, windows));
 }
 
