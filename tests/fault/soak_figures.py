@@ -8,9 +8,9 @@ import statistics
 
 # Growth of memory from the second to the last quarter of the windows that
 # still counts as none: what the mission file grew by meanwhile (SQLite caches
-# up to 16 MiB of it) and allocator noise. A leak of 100 bytes a ping would show 1.9 MB in
-# a minute of windows (1600 pings in 5 s); the first quarter fills the histories
-# in the map.
+# up to 16 MiB of it) and allocator noise. A leak of 100 bytes a ping would show
+# 1.9 MB in a minute of windows (1600 pings in 5 s); the first quarter fills the
+# histories in the map.
 GROWTH_KB_PER_MINUTE = 1536
 
 
